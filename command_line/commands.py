@@ -26,6 +26,7 @@ LOGS: Mapping[str, Command] = {
     "index": ("logs.catalogue_commands.index", "Read all new logs of a folder into its catalogue."),
     "query": ("logs.catalogue_commands.query", "Answer a SELECT on the catalogue of the logs."),
     "open": ("viewers.open_log.open_log", "Open a log in a viewer, with the project's layout."),
+    "annotate": ("logs.log_folder_commands.annotate_log", "Change the description of a log that is closed."),
     "list": ("logs.log_folder_commands.list_logs", "List the logs and the room that is left."),
     "recover": ("logs.log_folder_commands.recover", "Repair logs whose writer was interrupted."),
 }

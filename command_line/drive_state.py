@@ -11,6 +11,17 @@ def is_stale(drive: dict[str, Any]) -> bool:
     return age_s is None or age_s > STALE_S
 
 
+def supply_text(report: dict[str, Any]) -> str:
+    """Return the lowest voltage of all drives, their currents together, and the lowest voltage of the last stride."""
+    drives = [drive for drive in report["drives"] if not is_stale(drive)]
+    voltages_v = [drive["bus_voltage_v"] for drive in drives if drive["bus_voltage_v"] is not None]
+    currents_a = [drive["bus_current_a"] for drive in drives if drive["bus_current_a"] is not None]
+    parts = [f"{min(voltages_v):.1f} V"] if voltages_v else ["voltage unknown"]
+    parts += [f"{sum(currents_a):.1f} A"] if currents_a else []
+    stride_v = report["stride_supply_min_v"]
+    return ", ".join([*parts, f"lowest {stride_v:.1f} V in the last stride"] if stride_v is not None else parts)
+
+
 def torque_state(drive: dict[str, Any]) -> str:
     """Return on, off, or unknown: a drive that is not heard may have torque even if it last reported none."""
     age_s = drive["heartbeat_age_s"]

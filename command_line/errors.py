@@ -1,5 +1,6 @@
 """The errors that end a command: their messages, and the exit status of each."""
 
+import sys
 from collections.abc import Sequence
 
 from command_line import exit_codes
@@ -14,6 +15,7 @@ EXTRA_OF = {  # by module
     "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
     "distributed": "cluster",
 }  # fmt: skip
+PACKAGES = {"PIL": "pillow"}  # whose name is not that of the module
 
 
 class CommandError(Exception):
@@ -23,6 +25,13 @@ class CommandError(Exception):
         super().__init__("\n".join(messages))
         self.messages = messages
         self.status = status
+
+
+def missing_library(module: str) -> str:
+    """Return the message for a library of an extra that is not installed."""
+    command = f"'{sys.executable} -m pip install {PACKAGES.get(module, module)}'"
+    extra = f"install mudskipper with its extra '{EXTRA_OF[module]}'"
+    return f"{module} is not installed, which this needs: {command}, or {extra}"
 
 
 def usage_error(message: str) -> CommandError:
@@ -50,18 +59,19 @@ def _explain(problem: Exception) -> tuple[Sequence[str], int]:
             return [text], exit_codes.NOT_PERMITTED
         case CallRefusedError():
             return [text], exit_codes.REFUSED
-        case ModuleNotFoundError(name=str(name)) if extra := EXTRA_OF.get(name.partition(".")[0]):
-            needed = f"{name.partition('.')[0]} is not installed, which this needs"
-            return [f"{needed}: install mudskipper with its extra '{extra}'"], exit_codes.UNHEALTHY
+        case ModuleNotFoundError(name=str(name)) if name.partition(".")[0] in EXTRA_OF:
+            return [missing_library(name.partition(".")[0])], exit_codes.UNHEALTHY
     return _explain_files_and_buses(problem)
 
 
 def _explain_files_and_buses(problem: Exception) -> tuple[Sequence[str], int]:
     from firmware_host.buses import BusError  # imports too much for `status`
-    from firmware_host.configuration.file_problems import ConfigurationError, why_not
+    from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError, why_not
     from logs.files.log_error import LogError
 
     match problem:
+        case UnreadableFileError():  # as any other input that is missing
+            return problem.problems, exit_codes.UNHEALTHY
         case ConfigurationError():
             return problem.problems, exit_codes.CONFIGURATION
         case BusError() | LogError():

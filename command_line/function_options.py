@@ -28,9 +28,10 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
             groups[alternative] = parser.add_mutually_exclusive_group()
         if each.named:
             names = [each.option.name or flag_of(each.parameter), *filter(None, [each.option.also])]
-            groups[alternative].add_argument(*names, dest=each.parameter, **_keywords(each))
+            action = groups[alternative].add_argument(*names, dest=each.parameter, **_keywords(each))
         else:
-            groups[alternative].add_argument(each.parameter, **_keywords(each))
+            action = groups[alternative].add_argument(each.parameter, **_keywords(each))
+        action.offers = each.option.offers  # for the completion of shells
 
 
 def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:

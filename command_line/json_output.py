@@ -21,6 +21,7 @@ SCHEMAS = {  # what prints it -> version
     "demo": 1,
     "drives-find": 1,
     "replay": 1,
+    "log-annotate": 1,
     "log-comparison": 1,
     "log-info": 2,
     "log-index": 1,

@@ -6,12 +6,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NoReturn
 
 from command_line import exit_codes
 from command_line.commands import COMMANDS, Command, Target
 from command_line.function_options import add_function_options
 from command_line.screen import complaints
+from control.computing.suggestion import suggestion
 
 MISSING = "the following arguments are required"  # as argparse says it
 
@@ -68,32 +70,33 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuse unknown arguments, so that a command names its own usage, not that of `mudskipper`."""
         self.add_target()
+        self._require_command_first(sys.argv[1:] if args is None else args)
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             options = [name for action in self._actions for name in action.option_strings]
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(unknown[0], options)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}; {suggestion(unknown[0], options)}")
         return found, unknown
+
+    def _require_command_first(self, given: Sequence[str]) -> None:
+        """Refuse an option of a command that stands before it: argparse would take its value for the command."""
+        option = given[0].partition("=")[0] if given else ""
+        if self._subparsers and option.startswith("--") and option not in self._option_string_actions:
+            word = self._subparsers._group_actions[0].dest.upper()
+            self.error(
+                f"{option} stands after the {word.lower()} that it belongs to: '{self.prog} {word} {option} ...'"
+            )
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is no choice with the choices, the most similar first."""
         if action.choices is not None and value not in action.choices:
-            existing = suggestion(str(value), [*map(str, action.choices)])
-            raise argparse.ArgumentError(action, f"there is no {value!r}{existing}")
+            existing = suggestion(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"there is no {value!r}; {existing}")
 
     def error(self, message: str) -> NoReturn:
         if message.startswith(MISSING):
             message = f"{message} ('{self.prog} --help' explains them)"
         complaints.append(message)
         super().error(message)
-
-
-def suggestion(name: str, existing: Sequence[str]) -> str:
-    """Return the text that follows an unknown name: a similar one, and all that exist."""
-    from difflib import get_close_matches  # slow to import, and seldom needed
-
-    similar = get_close_matches(name, existing, 1)
-    there_are = f"did you mean {similar[0]}? There are" if similar else "there are"
-    return f"; {there_are} {', '.join(existing)}"
 
 
 class PrintVersion(argparse.Action):
@@ -112,7 +115,14 @@ class PrintCompletion(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, _: object, shell: object, __: object = None) -> NoReturn:
         import shtab
 
-        complete(parser)
+        from control.records import JOINTS
+
+        for action in complete(parser):
+            if offers := getattr(action, "offers", ""):
+                words = " ".join(offers.format(joint=joint) for joint in JOINTS)
+                action.complete = shtab.cmd(f"printf '%s\\n' {words}")  # type: ignore[attr-defined]
+            elif action.type is Path:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
         print(shtab.complete(parser, str(shell)))
         parser.exit()
 
@@ -129,7 +139,7 @@ def build_parser(given: Sequence[str] = ()) -> Parser:
     parser.add_argument(
         "--print-completion",
         action=PrintCompletion,
-        choices=("bash", "zsh", "tcsh"),
+        choices=("bash", "zsh", "fish", "tcsh"),
         help="print a completion script for this shell and exit",
     )
     chosen = {name: COMMANDS[name] for name in given[:1] if name in COMMANDS}
@@ -137,11 +147,13 @@ def build_parser(given: Sequence[str] = ()) -> Parser:
     return parser
 
 
-def complete(parser: argparse.ArgumentParser) -> None:
-    """Add the options of all commands, for documentation and completion."""
+def complete(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    """Add the options of all commands, for documentation and completion, and return them."""
     if isinstance(parser, Parser):
         parser.add_target()
+    found = [*parser._actions]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
-                complete(command)
+                found += complete(command)
+    return found

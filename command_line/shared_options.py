@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from drivers.can.run_folder import find_run_folder
-from experiments.study.option import Option
+from experiments.study.option import Option, OptionError
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
@@ -27,6 +27,15 @@ def _of_service_or_simulation(path: Path) -> Path:
     folder = None if path.exists() else find_run_folder()
     simulated = folder / SIMULATED / path.name if folder else path
     return simulated if simulated.exists() else path
+
+
+def interface_name(text: str) -> str:
+    """Accept an interface of python-can. Raises argparse.ArgumentTypeError for another one."""
+    from drivers.can.can_port import interface_problem  # slow to import
+
+    if problem := interface_problem(text):
+        raise OptionError(f"{text}: {problem}")
+    return text
 
 
 Json: TypeAlias = Annotated[bool, Option("print JSON for programs")]

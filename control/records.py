@@ -118,6 +118,7 @@ class DriveState(NamedTuple):
     temperature_stamp_s: float = NEVER_S
     bus_voltage_v: float = UNKNOWN
     bus_voltage_stamp_s: float = NEVER_S
+    bus_current_a: float = UNKNOWN  # that the drive takes from its supply
 
     @property
     def heard(self) -> bool:

@@ -159,5 +159,8 @@ class DriveAxis(Protocol):
 
     def clear_errors(self) -> None: ...
 
+    def request_supply(self) -> None:
+        """Ask for voltage and current of the supply, where no other message reports them."""
+
     def request_settings(self, now_s: float) -> None:
         """Ask for settings that are unknown or were read long ago. It is called in every tick while idle."""

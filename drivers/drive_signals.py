@@ -24,7 +24,7 @@ class DriveSignals(ABC):
     def reset(self) -> None:
         self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
-        self._temperature_c = self._bus_voltage_v = UNKNOWN
+        self._temperature_c = self._bus_voltage_v = self._bus_current_a = UNKNOWN
         self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
         self._read_s = self._read_before_s = NEVER_S
         self.closed_loop = False  # by the drive's newest report
@@ -63,6 +63,7 @@ class DriveSignals(ABC):
             self._temperature_stamp_s,
             self._bus_voltage_v,
             self._bus_voltage_stamp_s,
+            self._bus_current_a,
         )
 
     @property

@@ -16,6 +16,7 @@ from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, MalformedMessageErr
 from drivers.drive import FD, DriveAxis, DriveHealth
 from drivers.transmit_gate import TransmitGate
 
+SUPPLY_TICKS = 10  # between questions for a supply, one drive after the other: 38 a second are 1 % of a bus at most
 REPEAT_S = 0.1  # between two requests to change the state of a drive; its next report has the result
 LONGEST_IN_QUEUE_S = 2.0  # an older stamp belongs to another clock
 
@@ -65,6 +66,7 @@ class Drives:
         self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
         self._armed_s = self._disarmed_s = NEVER_S
         self._lost_before = self._lost
+        self._supply_tick = 0
         self._idling_lost = False  # the bus refused a command to idle, even if the drives report idle
 
     def poll(self) -> None:
@@ -180,6 +182,13 @@ class Drives:
         """Ask for firmware, watchdog and other settings, now and then: a restart forgets them, and they may change."""
         for axis in self.axes:
             axis.request_settings(now_s)
+
+    def request_supply(self) -> None:
+        """Ask the drives in turn for their supply. It is called in every tick."""
+        self._supply_tick += 1
+        turn, rest = divmod(self._supply_tick, SUPPLY_TICKS)
+        if not rest:
+            self.axes[turn % len(self.axes)].request_supply()
 
     def close(self) -> None:
         for port in self.ports.values():

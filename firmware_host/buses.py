@@ -31,8 +31,10 @@ def open_bus(name: str, bus: BusParameters) -> CanPort:
     """Open one bus; raises BusError."""
     try:
         return open_port(bus.interface, bus.channel, bus.options, fd=bus.data_bit_rate_kbit_s > 0)
-    except (can.CanError, OSError, ValueError, TypeError, ImportError) as problem:
-        cause = CAUSES.get(_error_number(problem), str(problem))
+    except Exception as problem:  # python-can's drivers raise what they like, NameError too
+        cause = CAUSES.get(_error_number(problem)) or " ".join(str(problem).split())
+        if not isinstance(problem, can.CanError | OSError | ValueError | TypeError):
+            cause = f"its driver cannot be used on this computer ({type(problem).__name__}: {cause}); install it"
         raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {cause}") from problem
 
 

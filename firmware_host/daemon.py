@@ -254,6 +254,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse([f"mudskipperd: {message}" for message in problem.problems], EXIT_CONFIGURATION)
     _print_warnings("mudskipperd: ", configuration.warnings)
     if options.check_config:
+        print(f"mudskipperd: {options.config} is valid")
         return 0
     shutdown = Shutdown()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):

@@ -227,6 +227,7 @@ class Loop:
         if self.mode is Mode.IDLE:
             self.drives.request_settings(now_s)
         self.drives.send(self.sent.torques_nm, self.period_s)
+        self.drives.request_supply()
 
     def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s

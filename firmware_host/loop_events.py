@@ -75,7 +75,8 @@ class LoopEvents:
         for message in learned.messages:
             self.report(now_s, message)
         for stride in learned.strides:
-            self._recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
+            row = stride_row(now_s, stride.estimate, stride.chosen_depth_m, stride.supply_min_v)
+            self._recorder.put(STRIDE_KIND, row)
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
         """Write the faults that began or are over; those of a drive that may still answer only once they last."""

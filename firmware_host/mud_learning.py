@@ -13,6 +13,7 @@ one before.
 """
 
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work
@@ -24,7 +25,7 @@ from control.faults import Fault, FaultKind
 from control.geometry import FlipperGeometry
 from control.parameters.adaptation_parameters import AdaptationParameters, Method
 from control.parameters.gait_parameters import GaitParameters
-from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
+from control.records import NO_LOAD, UNKNOWN, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator
 from estimation.stride_clock import STROKES
 from firmware_host.configuration.configuration import Configuration
@@ -42,11 +43,12 @@ METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParam
 
 
 class ClosedStride(NamedTuple):
-    """A finished stride of one flipper, with the depth that was chosen after it."""
+    """A finished stride of one flipper, with the depth chosen after it and the lowest voltage of its drives."""
 
     number: int  # since the start, counting all flippers
     estimate: StrideEstimate
     chosen_depth_m: float
+    supply_min_v: float  # since the stride before closed; NaN where no drive reports it
 
 
 class LearningReport(NamedTuple):
@@ -85,6 +87,8 @@ class MudLearning:
         self._closed: list[ClosedStride] = []  # since the last report
         self._messages: list[str] = []  # likewise
         self._unexamined: list[StrideEstimate] = []
+        self._rig = configuration.rig
+        self._lowest_v = [inf] * len(configuration.rig.joints)  # since the last stride closed
 
     def reset(self, depth_m: float) -> None:
         """Start a new walk. Earlier strides stay stored; unfinished work is dropped, so call `finish` before."""
@@ -92,10 +96,15 @@ class MudLearning:
         self.adaptation.reset(depth_m)
         self.depth_reason = "start"
         self._firm_ticks = 0
+        self._lowest_v = [inf] * len(self._lowest_v)
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
         """Add a sample to the estimator."""
         self.loads, self._closing = self.estimator.add(now_s, phase, states, body)
+        lowest_v = self._lowest_v
+        for joint, state in enumerate(states):
+            if state.bus_voltage_v < lowest_v[joint]:
+                lowest_v[joint] = state.bus_voltage_v
 
     def adapt(self, controller: Controller) -> None:
         """Begin to close the strides that the last sample ended; end an insertion that has met solid mud."""
@@ -138,7 +147,11 @@ class MudLearning:
         messages += yield from self._choose(controller, order, strides, walked_m)
         self._messages += messages
         depth_m, first = controller.gait.next_depth_m, self.strides_closed
-        closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(strides)]
+        lowest_v, self._lowest_v = self._lowest_v, [inf] * len(self._lowest_v)
+        supply_v = {flipper: _lowest_v(lowest_v[self._rig.joints_of(flipper)]) for flipper in self._rig.flippers}
+        closed = [
+            ClosedStride(first + i, estimate, depth_m, supply_v[estimate.flipper]) for i, estimate in enumerate(strides)
+        ]
         self._closed += closed
         self._unexamined += strides
         self.strides_closed += len(closed)
@@ -178,6 +191,10 @@ class MudLearning:
         strides, self._unexamined = self._unexamined, []
         wild = [stride for stride in strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
         return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]
+
+
+def _lowest_v(voltages_v: Sequence[float]) -> float:
+    return lowest_v if (lowest_v := min(voltages_v)) < inf else UNKNOWN
 
 
 def _is_wild(estimate: Estimate) -> bool:

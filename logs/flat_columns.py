@@ -15,6 +15,8 @@ from control.bounds import Meaning, unit_of
 from firmware_host.log.rows import COEFFICIENT_UNIT
 from firmware_host.log.schema import Field, RowKind
 
+WALL_CLOCK = "universal time of stamp_s, by the clocks' offset when the log began"
+
 
 @dataclass(frozen=True)
 class Column:
@@ -45,11 +47,19 @@ def stack_rows(rows: Sequence[Mapping[str, Any]], kind: RowKind) -> NDArray[np.v
     return array
 
 
-def flat_columns(rows: NDArray[np.void], kind: RowKind) -> list[Column]:
-    """Return the columns in the order of the fields."""
+def flat_columns(rows: NDArray[np.void], kind: RowKind, wall_offset_ns: int | None = None) -> list[Column]:
+    """Return the columns in the order of the fields; with the offset of the wall clock, `time` comes first."""
+    time = [] if wall_offset_ns is None else [Column("time", "", WALL_CLOCK, _wall_times(rows, wall_offset_ns), {})]
     known = {field.name: field for field in kind.fields}
     names = rows.dtype.names or ()
-    return [column for name in names for column in _columns_of(known.get(name, Field(name, "")), rows[name])]
+    return time + [column for name in names for column in _columns_of(known.get(name, Field(name, "")), rows[name])]
+
+
+def _wall_times(rows: NDArray[np.void], offset_ns: int) -> NDArray[np.datetime64]:
+    """Return universal time in nanoseconds; no time for a row without a stamp."""
+    known = np.isfinite(rows["stamp_s"])
+    stamps_ns = np.round(np.where(known, rows["stamp_s"], 0.0) * 1e9).astype(np.int64)
+    return np.where(known, (stamps_ns + offset_ns).astype("datetime64[ns]"), np.datetime64("NaT", "ns"))
 
 
 def _columns_of(field: Field, values: NDArray[Any]) -> list[Column]:

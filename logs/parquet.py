@@ -17,6 +17,7 @@ from firmware_host.log.log_file import ATTACHMENT
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
 from logs.files.log_error import Watch, unwatched
 from logs.files.log_reader import AnyLog, TickPass
+from logs.files.log_summary import wall_offset_ns
 from logs.files.tick_array import in_groups
 from logs.files.whole_files import whole_files
 from logs.flat_columns import Column, flat_columns, stack_rows
@@ -43,16 +44,17 @@ def write_parquet(log: AnyLog, folder: Path, stem: str, watch: Watch = unwatched
 
 def _write_tables(log: AnyLog, paths: list[Path], metadata: dict[str, str], complete: bool, watch: Watch) -> TickPass:
     """Return the pass over the ticks, which knows whether they were cut off meanwhile."""
-    metadata = metadata | {"complete": str(complete).lower()}
+    metadata, offset_ns = metadata | {"complete": str(complete).lower()}, wall_offset_ns(log.metadata)
     for path, rows, kind in zip(paths[1:], (log.strides, log.events), (STRIDE, EVENT), strict=True):
-        pq.write_table(arrow_table(flat_columns(stack_rows(rows, kind), kind), metadata), path, compression="zstd")
+        table = arrow_table(flat_columns(stack_rows(rows, kind), kind, offset_ns), metadata)
+        pq.write_table(table, path, compression="zstd")
     kind, numbers = tick_kind(log.rig), _enumerated(log)
-    empty = arrow_table(flat_columns(log.ends[:0], kind), metadata, numbers)
+    empty = arrow_table(flat_columns(log.ends[:0], kind, offset_ns), metadata, numbers)
     ticks = TickPass(log, watch, "rows written")
     with pq.ParquetWriter(paths[0], empty.schema, compression="zstd") as writer:
         writer.write_table(empty)
         for rows_of_group in in_groups(ticks, ROWS_PER_GROUP):
-            writer.write_table(arrow_table(flat_columns(rows_of_group, kind), metadata, numbers))
+            writer.write_table(arrow_table(flat_columns(rows_of_group, kind, offset_ns), metadata, numbers))
     return ticks
 
 
@@ -82,4 +84,5 @@ def _array_of(column: Column, numbers: NDArray[Any] | None) -> pa.Array:
     if column.words:
         codes, words = column.coded(numbers)
         return pa.DictionaryArray.from_arrays(codes, pa.array(words, pa.string()))
-    return pa.array(np.ascontiguousarray(column.values))
+    is_time = column.values.dtype.kind == "M"
+    return pa.array(np.ascontiguousarray(column.values), pa.timestamp("ns", tz="UTC") if is_time else None)

@@ -25,7 +25,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from firmware_host.log.log_file import ATTACHMENT, METADATA, LogFile, lock_file
+from firmware_host.log.log_file import ANNOTATION, ATTACHMENT, METADATA, LogFile, lock_file
 from firmware_host.log.log_folder import BROKEN, PART, finished_path, move_file, unfinished_files
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS
 from firmware_host.log.schema import LayoutError
@@ -89,9 +89,9 @@ class Salvage:
 
     def _read(self, opcode: int, stream: ReadDataStream) -> list[Record]:
         """Return the records of a chunk, each chunk once: a piece of a file may be in it twice. Raises DAMAGE."""
-        if opcode == Opcode.METADATA and (metadata := Metadata.read(stream)).name == METADATA:
-            self.metadata = dict(metadata.metadata)
-            self.wall_offset_ns = int(self.metadata.pop("wall_minus_monotonic_ns", "0"))
+        if opcode == Opcode.METADATA and (metadata := Metadata.read(stream)).name in (METADATA, ANNOTATION):
+            self.metadata |= metadata.metadata
+            self.wall_offset_ns = int(self.metadata.pop("wall_minus_monotonic_ns", self.wall_offset_ns))
         elif opcode == Opcode.ATTACHMENT and (attachment := Attachment.read(stream)).name == ATTACHMENT:
             self.configuration_text = attachment.data.decode()
         elif opcode == Opcode.CHUNK:

@@ -8,7 +8,9 @@ from control.records import Rig
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
+from firmware_host.trial import METADATA_KEY, OperatorReport, from_json
 from logs.files.log_reader import read_logs
+from logs.files.log_summary import operator_reports, wall_offset_ns
 from logs.flat_columns import stack_rows
 from logs.replay import Replay, configuration_of, replay_files
 from mudskipper.rows import Rows
@@ -36,6 +38,16 @@ class OpenedLog:
         """Return the configuration with which the daemon ran. Raises LogError where this version does not accept it."""
         return configuration_of(self.paths[0], self.configuration_text)
 
+    @property
+    def trial(self) -> dict[str, str]:
+        """Return the description of the trial; empty where the log has none, or several."""
+        return from_json(self.metadata.get(METADATA_KEY, ""))
+
+    @property
+    def reports(self) -> list[tuple[float, OperatorReport]]:
+        """Return the trials, notes and markers: `stamp_s`, and a report with `kind`, `time`, `by` and `text`."""
+        return operator_reports(self.events)
+
 
 def open_log(path: Paths, fields: Sequence[str] = ()) -> OpenedLog:
     """Read an MCAP log, or several segments of one run. Raises LogError.
@@ -44,10 +56,11 @@ def open_log(path: Paths, fields: Sequence[str] = ()) -> OpenedLog:
     """
     paths = _as_paths(path)
     log = read_logs(paths, fields=fields)
+    offset_ns = wall_offset_ns(log.metadata)
     arrays = {
-        "ticks": Rows.of(log.ticks, tick_kind(log.rig)),
-        "strides": Rows.of(stack_rows(log.strides, STRIDE), STRIDE),
-        "events": Rows.of(stack_rows(log.events, EVENT), EVENT),
+        "ticks": Rows.of(log.ticks, tick_kind(log.rig), offset_ns),
+        "strides": Rows.of(stack_rows(log.strides, STRIDE), STRIDE, offset_ns),
+        "events": Rows.of(stack_rows(log.events, EVENT), EVENT, offset_ns),
     }
     return OpenedLog(paths=paths, **(log._asdict() | arrays))
 

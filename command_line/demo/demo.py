@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from contextlib import redirect_stdout
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,9 +15,9 @@ import numpy as np
 
 from command_line import exit_codes
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
-from command_line.errors import CommandError
+from command_line.errors import CommandError, missing_library
 from command_line.json_output import print_json
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, stride_line
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from command_line.shared_options import Json, Seed
 from control.modes import Mode
 from experiments.reports.counted_nouns import counted
@@ -39,13 +40,15 @@ def demo(
     out: Annotated[Path, Option("for log and plot", metavar="DIR", parse=folder)] = Path("mudskipper-demo"),
     seed: Seed = 1,
     depth: Annotated[
-        float | None, Option("fixed insertion depth (default: adaptive)", unit="cm", above=0.0, high=20.0)
+        float | None, Option("fixed insertion depth (default: adaptive)", unit="cm", low=0.5, high=20.0)
     ] = None,
     world: Annotated[Path | None, Option("describes the ground (default: three muds)")] = None,
 ) -> int:
     _end_on_signals()
     if world:
         load_world(world)  # is refused before anything starts
+    if find_spec("matplotlib") is None:
+        complain(f"the walk gets no plot: {missing_library('matplotlib')}")
     out.mkdir(parents=True, exist_ok=True)
     before = set(log_files(out, DONE))
     try:
@@ -95,9 +98,12 @@ def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[st
     """Print the summary, draw the plot, and return the summary."""
     log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path, fields=WALKED)
-    plot_path = out / log_path.with_suffix(".png").name
+    plot_path = out / log_path.with_suffix(".png").name if find_spec("matplotlib") else None
     summary = summarise(report, demonstration, log, log_path, plot_path)
-    print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
+    print(f"\n{summary_text(summary)}", flush=True)
+    if plot_path is None:
+        return summary
+    print("Drawing ...", flush=True)
     from experiments.pictures.mud_layout import layout_of_track
     from experiments.pictures.recorded_walk import read_walk
     from experiments.pictures.walk_plot import plot_walk  # matplotlib loads slowly; the walk must not wait
@@ -107,7 +113,9 @@ def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[st
     return summary
 
 
-def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path) -> dict[str, Any]:
+def summarise(
+    report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path | None
+) -> dict[str, Any]:
     track = demonstration.track
     stamps_s, positions_m = walked_path(log)
     strides = []
@@ -121,7 +129,7 @@ def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: P
         "dropped_rows": report["log"]["dropped"],
         "warnings": report["warnings"],
         "log": str(log_path),
-        "plot": str(plot_path),
+        "plot": str(plot_path) if plot_path else None,
     }
 
 

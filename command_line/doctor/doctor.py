@@ -114,7 +114,7 @@ def examine_configuration(path: Path) -> tuple[Configuration | None, list[Findin
 
 
 def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:
-    pid, daemon = _ask_daemon(socket, configuration.faults.longest_watchdog_s)
+    pid, daemon = _ask_daemon(socket, configuration)
     service = process_limits(ROOT, pid) if pid else unit_limits(ROOT)
     shell = process_limits(ROOT, None)
     priority = thread_priority(ROOT, pid) if pid else None
@@ -134,31 +134,33 @@ def _examine_clock() -> Finding:
     return examine_clock(datetime.now(UTC), clock_is_synchronised(), has_clock_chip(ROOT))
 
 
-def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, list[Finding]]:
+def _ask_daemon(socket: Path, configuration: Configuration) -> tuple[int | None, list[Finding]]:
     """Return the daemon's process id, and the findings about itself and its drives."""
     pid = None
     try:
         client = StatusClient(socket)
         with closing(client):
             pid = client.daemon_pid
-            return pid, list(examine_daemon(client.call("status"), software_version(), longest_watchdog_s))
+            return pid, list(examine_daemon(client.call("status"), software_version(), configuration))
     except tuple(UNANSWERED) as problem:
         level, fix = UNANSWERED[type(problem)]
         return pid, [Finding("daemon", level, str(problem), fix)]
 
 
-def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
+def examine_daemon(status: dict[str, Any], version: str, configuration: Configuration) -> Iterator[Finding]:
     """Yield the findings about the status of a daemon; `version` is that of this command."""
     form = "compiled" if status.get("compiled") else "interpreted"  # an older daemon does not say it
     text, same = f"runs, version {status['version']}, {form}, {status['mode']}", status["version"] == version
     text += "" if same else f"; this command is version {version}"
     yield ok_if(same, "daemon", text, "'systemctl restart mudskipper', with the robot disarmed")
     for drive in status["drives"]:
-        yield _examine_watchdog(f"watchdog.{drive['joint']}", drive["watchdog_s"], longest_watchdog_s)
+        yield _examine_watchdog(drive["joint"], drive["watchdog_s"], configuration)
 
 
-def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float) -> Finding:
-    fix = "docs/how-to/odrive.md"
+def _examine_watchdog(joint: str, watchdog_s: float | None, configuration: Configuration) -> Finding:
+    identity, longest_s = f"watchdog.{joint}", configuration.faults.longest_watchdog_s
+    drive = configuration.drive.get(joint)  # another configuration than the daemon's may have other joints
+    fix = f"docs/how-to/{drive.type if drive else 'drives'}.md"
     if watchdog_s is None:
         return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", fix)
     if watchdog_s == 0.0:

@@ -11,7 +11,7 @@ import tomlkit
 
 from command_line.drives.joint_setup import JointSetup
 from drivers.bench.drive_setup import same
-from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 from logs.files.whole_files import whole_file
 
 HEAD = "Settings of the drives, written by 'mudskipper drives setup' at {}. Restore the old ones with --restore."
@@ -65,7 +65,7 @@ def read_backup(path: Path) -> dict[str, Backup]:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
         return {joint: _backup(each) for joint, each in document.items()}
     except OSError as problem:
-        raise ConfigurationError([f"{path}: {problem.strerror}"]) from None
+        raise UnreadableFileError([f"{path}: {problem.strerror}"]) from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise ConfigurationError([f"{path}: is no file of 'mudskipper drives setup --write'"]) from None
 

@@ -5,10 +5,11 @@ from typing import Annotated, Any
 
 from command_line import exit_codes
 from command_line.drives.opened_buses import FD_RATE_KBIT_S, OpenedBus, opened_buses
-from command_line.errors import CommandError
+from command_line.errors import usage_error
 from command_line.json_output import print_json
 from command_line.screen import GREEN, RED, YELLOW, coloured, watched
-from command_line.shared_options import Json, RobotConfiguration
+from command_line.shared_options import Json, RobotConfiguration, interface_name
+from control.computing.suggestion import suggestion
 from drivers.bench.search import SearchResult, expectation_problems, id_problems
 from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
@@ -26,7 +27,9 @@ def find(
     config: RobotConfiguration,
     json: Json = False,
     bus: Annotated[tuple[str, ...], Option("configured bus (default: all)")] = (),
-    interface: Annotated[str | None, Option("of python-can, such as socketcan, without a configuration")] = None,
+    interface: Annotated[
+        str | None, Option("of python-can, such as socketcan, without a configuration", parse=interface_name)
+    ] = None,
     channel: Annotated[str | None, Option("of that interface, such as can0")] = None,
     fd: Annotated[bool, Option("that interface carries CAN FD")] = False,
     type: Annotated[tuple[str, ...], Option("ask drives of this type alone", choices=tuple(DRIVE_BENCHES))] = (),
@@ -36,14 +39,12 @@ def find(
         rate_kbit_s = FD_RATE_KBIT_S if fd else 0
         buses = {channel: BusParameters(interface, channel, {}, 1000, rate_kbit_s)}
     elif interface or channel:
-        belong = "--interface and --channel belong together: --interface socketcan --channel can0"
-        raise CommandError(belong, status=exit_codes.CONFIGURATION)
+        raise usage_error("--interface and --channel belong together: --interface socketcan --channel can0")
     else:
         configuration = load_configuration(config)
         drives, configured = configuration.drive, configuration.bus
         if unknown := next((name for name in bus if name not in configured), None):
-            there_are = f"--bus {unknown}: {config} has {', '.join(configured)}"
-            raise CommandError(there_are, status=exit_codes.CONFIGURATION)
+            raise usage_error(f"--bus {unknown}: {config} has no such bus; {suggestion(unknown, configured)}")
         buses = {name: each for name, each in configured.items() if name in (bus or configured)}
     with opened_buses(buses) as opened, watched() as show:
         results = [(each, each.search(type, show)) for each in opened]

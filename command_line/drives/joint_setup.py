@@ -13,7 +13,7 @@ from drivers.bench.search import expectation_problems, id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 
 Show = Callable[[str, int, int], None]
 NUMBERS = "flat_endpoints*.json"  # next to the configuration
@@ -53,9 +53,10 @@ def read_documents(options_files: Sequence[Path] | None, configuration: Path) ->
     for file in files:
         try:
             documents.append(json.loads(file.read_text(encoding="utf-8")))
-        except (OSError, ValueError) as problem:
-            reason = problem.strerror if isinstance(problem, OSError) else "is no JSON"
-            raise ConfigurationError([f"{file}: {reason}"]) from None
+        except OSError as problem:
+            raise UnreadableFileError([f"{file}: {problem.strerror}"]) from None
+        except ValueError:
+            raise ConfigurationError([f"{file}: is no JSON"]) from None
     return documents
 
 

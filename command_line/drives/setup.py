@@ -13,6 +13,7 @@ from command_line.drives.opened_buses import OpenedBus, opened_buses
 from command_line.errors import CommandError, usage_error
 from command_line.screen import GREEN, RED, coloured, watched
 from command_line.shared_options import RobotConfiguration
+from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.settings_change import Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES
@@ -26,7 +27,9 @@ Changes = Mapping[str, Mapping[str, float]]  # by joint and key
 
 
 def setup(
-    joint: Annotated[tuple[str, ...], Option("such as left_sweep (default: all)", metavar="JOINT")] = (),
+    joint: Annotated[
+        tuple[str, ...], Option("such as left_sweep (default: all)", metavar="JOINT", offers="{joint}")
+    ] = (),
     *,
     config: RobotConfiguration,
     write: Annotated[bool, Option("write and store what differs, one drive at a time", alternative="write")] = False,
@@ -71,7 +74,7 @@ def _joints(named: Sequence[str], configuration: Configuration, backups: Mapping
     known = configuration.rig.joints
     for joint in [*named, *backups]:
         if joint not in known:
-            raise ConfigurationError([f"{joint}: this robot has {', '.join(known)}"])
+            raise usage_error(f"{joint}: this robot has no such joint; {suggestion(joint, known)}")
     for joint in named:
         if backups and joint not in backups:
             raise ConfigurationError([f"{joint}: the file has {', '.join(backups)}"])

@@ -14,16 +14,16 @@ from typing import Annotated, NamedTuple
 
 from command_line import exit_codes
 from command_line.drives.opened_buses import opened_buses
-from command_line.errors import CommandError
+from command_line.errors import CommandError, usage_error
 from command_line.screen import complain, watched
 from command_line.shared_options import RobotConfiguration
+from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import read_text
 
@@ -43,7 +43,7 @@ class Reading(NamedTuple):
 
 
 def zero(
-    joint: Annotated[tuple[str, ...], Option("such as left_sweep", metavar="JOINT")],
+    joint: Annotated[tuple[str, ...], Option("such as left_sweep", metavar="JOINT", offers="{joint}")],
     *,
     config: RobotConfiguration,
     yes: Annotated[bool, Option("write it without asking")] = False,
@@ -52,7 +52,7 @@ def zero(
     configuration = parse_configuration(text, config)
     for name in joint:
         if name not in configuration.rig.joints:
-            raise ConfigurationError([f"{name}: this robot has {', '.join(configuration.rig.joints)}"])
+            raise usage_error(f"{name}: this robot has no such joint; {suggestion(name, configuration.rig.joints)}")
     readings = _read(configuration, list(dict.fromkeys(joint)))
     moved = [each for each in readings if each.new_turn != each.old_turn]
     try:

@@ -30,7 +30,7 @@ from experiments.study.provenance import identity, provenance
 from experiments.study.results_folder import PAGE, make_folder, remove_unused, require_unfinished, set_aside
 from experiments.study.session import Ending, Session
 from experiments.study.workers import LocalWorkers, Workers, WorkersError
-from firmware_host.configuration.file_problems import ConfigurationError, why_not
+from firmware_host.configuration.file_problems import why_not
 from operator_client.status_client import CallRefusedError
 
 NEEDED = ("matplotlib", "pandas", "pyarrow")
@@ -52,9 +52,6 @@ def run_study(options: argparse.Namespace) -> int:
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
 
 
 def _conduct(options: argparse.Namespace, module: ModuleType) -> int:

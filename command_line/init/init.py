@@ -15,13 +15,15 @@ from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.key_reference import Key, configuration_keys
 from command_line.init.new_file import NewRobot, drive_keys, new_file
 from command_line.init.questions import Ask, ask, one_of
+from command_line.shared_options import interface_name
+from control.computing.suggestion import suggestion
 from control.geometry import FlipperGeometry
 from control.plate_outline import Corner
 from control.records import FLIPPERS, JOINTS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from experiments.campaign.plate_file import read_corners
 from experiments.study.option import Option
-from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 from firmware_host.configuration.loading import parse_configuration
 
 PRINTED = Path("-")
@@ -57,11 +59,13 @@ def init(
     flippers: Annotated[str | None, Option("one with two motors, or both with four", choices=FLIPPER_SETS)] = None,
     base: Annotated[str | None, Option("a bench, or a body that the flippers move", choices=BASES)] = None,
     drive: Annotated[str | None, Option("protocol of the drives", choices=tuple(DRIVE_TYPES))] = None,
-    interface: Annotated[str | None, Option("of python-can, such as socketcan")] = None,
+    interface: Annotated[str | None, Option("of python-can, such as socketcan", parse=interface_name)] = None,
     from_bus: Annotated[bool, Option("search its channels for drives, and write what is found")] = False,
     fd: Annotated[bool, Option("with --from-bus: it carries CAN FD")] = False,
     channel: Annotated[tuple[str, ...], Option("such as can0; twice: the left and the right flipper's own")] = (),
-    node: Annotated[tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id)] = (),
+    node: Annotated[
+        tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id, offers="{joint}=")
+    ] = (),
     plate: Annotated[
         str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
     ] = None,
@@ -109,7 +113,7 @@ def _described(
 ) -> NewRobot:
     types = tuple(DRIVE_TYPES)
     drive = drive or ask(f"drives: {' or '.join(types)}", robot.drive_type, one_of(types), read)
-    interface = interface or ask("interface of python-can", robot.interface, str, read)
+    interface = interface or ask("interface of python-can", robot.interface, interface_name, read)
     robot = robot._replace(drive_type=drive, interface=interface, channels=_channels(channels, robot.rig, read))
     return robot._replace(node_ids=_node_ids(node_ids, robot, read))
 
@@ -124,7 +128,7 @@ def _from_bus(
     read: Ask | None,
 ) -> NewRobot:
     """Scan the buses, and ask which drive moves which joint. Raises ConfigurationError and BusError."""
-    interface = interface or ask("interface of python-can", robot.interface, str, read)
+    interface = interface or ask("interface of python-can", robot.interface, interface_name, read)
     robot = robot._replace(interface=interface, channels=_channels(channels, robot.rig, read))
     found = scan(robot, carries_fd, drive)
     for channel, drives in found.items():
@@ -134,19 +138,19 @@ def _from_bus(
 
 
 def _channels(given: Sequence[str] | None, rig: Rig, read: Ask | None) -> tuple[str, ...]:
-    """Raises ConfigurationError."""
+    """Raises CommandError."""
     text = "its channels, one for all flippers or one for each" if len(rig.flippers) > 1 else "its channel"
     channels = tuple(given or ask(text, "can0", str, read).replace(",", " ").split())
     if len(channels) not in (1, len(rig.flippers)):
         possible = " or ".join(map(str, sorted({1, len(rig.flippers)})))
-        raise ConfigurationError([f"{len(channels)} channels, {', '.join(channels)}: must be {possible} for this rig"])
+        raise usage_error(f"{len(channels)} channels, {', '.join(channels)}: must be {possible} for this rig")
     return channels
 
 
 def _node_ids(given: Mapping[str, int], robot: NewRobot, read: Ask | None) -> dict[str, int]:
-    """Raises ConfigurationError."""
+    """Raises CommandError."""
     for joint in given.keys() - set(robot.rig.joints):
-        raise ConfigurationError([f"--node {joint}: this rig has {', '.join(robot.rig.joints)}"])
+        raise usage_error(f"--node {joint}: this rig has no such joint; {suggestion(joint, robot.rig.joints)}")
     bounds = next(key.bounds for key in drive_keys(robot.drive_type) if key.name == "node_id")
     assert bounds is not None
     return {
@@ -167,16 +171,17 @@ def _geometry(plate: str | None, given: Mapping[str, float], read: Ask | None) -
 
 
 def _corners(plate: str | None, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
-    """Return the plate's corners; none for a rectangle. Raises ConfigurationError."""
+    """Return the plate's corners; none for a rectangle. Raises CommandError and ConfigurationError."""
     sides = [name for name in SIDES if name in given]
     if plate and sides:
-        raise ConfigurationError([f"--set {sides[0]}: must be left out where --plate gives the plate's corners"])
+        raise usage_error(f"--set {sides[0]}: must be left out where --plate gives the plate's corners")
     prompt = f"plate: {RECTANGLE}, or a file of its corners"
     plate = plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer, read))
     try:
         return () if plate == RECTANGLE else read_corners(Path(plate))
     except ValueError as problem:
-        raise ConfigurationError([str(problem)]) from problem
+        kind = UnreadableFileError if isinstance(problem.__cause__, OSError) else ConfigurationError
+        raise kind([str(problem)]) from problem
 
 
 def _plate_answer(line: str) -> str:

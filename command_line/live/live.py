@@ -5,10 +5,13 @@ serves them to Foxglove and Lichtblick by WebSocket, or as a page for a browser 
 that is not there yet, and for one that restarts.
 """
 
+import errno
 import signal
+import socket as socket_module  # `socket` is an option
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from socket import AF_INET, AF_INET6
 from typing import Annotated, NoReturn, Protocol
 
 from command_line import exit_codes
@@ -43,6 +46,7 @@ def live(
     ] = (),
     port: Annotated[int, Option("0: a free one (default: 8765)", low=0, high=65535)] = 8765,
 ) -> int:
+    _require_address(host, port)
     try:
         audience, address = _open_page(host, port, socket, name) if page else _open_viewers(host, port)
     except ModuleNotFoundError:
@@ -50,13 +54,29 @@ def live(
             "viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page"
         ) from None
     except OSError as problem:
-        raise CommandError(f"{host}:{port}: {problem.strerror or problem}; choose another --port") from None
+        raise CommandError(f"{host}:{port}: {problem.strerror or problem}") from None
     print(f"Serving on {address}. Ctrl-C ends.", flush=True)
     try:
         pass_on(RowSubscription(stream_path(socket)), audience)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would interrupt the end of the server's threads
         return exit_codes.OK
+
+
+def _require_address(host: str, port: int) -> None:
+    """Raise CommandError where this computer cannot listen there; the servers' own errors do not say which is wrong."""
+    try:
+        with socket_module.create_server((host, port), family=AF_INET6 if ":" in host else AF_INET):
+            return
+    except OSError as problem:
+        wrong_host = problem.errno == errno.EADDRNOTAVAIL or (problem.errno or 0) < 0  # EAI_NONAME
+        what = f"--host {host}: no address of this computer" if wrong_host else f"{host}:{port}: {problem.strerror}"
+        other = (
+            "127.0.0.1 is only this computer, 0.0.0.0 all of its networks" if wrong_host else "choose another --port"
+        )
+        raise CommandError(
+            f"{what}; {other}", status=exit_codes.USAGE if wrong_host else exit_codes.UNHEALTHY
+        ) from None
 
 
 def _open_page(host: str, port: int, socket: Path, names: Sequence[str]) -> tuple[Audience, str]:

@@ -128,7 +128,7 @@ def _picture_path(log: Path, ending: str) -> Path:
     """Return the log's path with another ending, but not in active/, which the log leaves when it is finished."""
     name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
     if log.absolute().parent.name != ACTIVE:
-        return log.with_name(name)
+        return log.parent / name  # also of a folder that is given by mistake
     done = log.absolute().parent.parent / DONE
     return done / name if os.access(done, os.W_OK) else Path(name)
 

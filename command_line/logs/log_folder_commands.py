@@ -8,9 +8,11 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
 from command_line import exit_codes
+from command_line.errors import usage_error
 from command_line.json_output import print_json
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
 from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
+from command_line.operation.trial import KeyValues, show
 from command_line.screen import complain, watched
 from command_line.shared_options import Json
 from experiments.reports.text_tables import number, table
@@ -26,6 +28,8 @@ from firmware_host.log.log_folder import (
     stored_files,
     unfinished_files,
 )
+from firmware_host.trial import changed
+from logs.annotation import annotate
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import DAMAGE, LogError
 from logs.files.stored_logs import is_being_written, preserve, size_text, why_not_moved
@@ -166,6 +170,24 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
             except OSError as problem:
                 problems.append(why_not_moved(path, problem))
     return recovered, problems
+
+
+def annotate_log(file: Annotated[Path, Option("log of this project")], values: KeyValues, *, json: Json = False) -> int:
+    """Add the description to the log itself; its rows stay as they are."""
+    try:
+        changed({}, dict(values))
+        trial = annotate(file, dict(values))
+    except OSError as problem:
+        raise LogError(why_not_moved(file, problem)) from None
+    except LogError:
+        raise
+    except ValueError as problem:
+        raise usage_error(str(problem)) from None
+    if json:
+        print_json("log-annotate", {"log": str(file), "trial": trial})
+    else:
+        show({"": trial})
+    return exit_codes.OK
 
 
 def preserve_log(

@@ -12,7 +12,9 @@ from experiments.study.option import Option
 
 
 def fail(
-    component: Annotated[str | None, Option("left_sweep, bus.left, pose ..., or all", metavar="component")] = None,
+    component: Annotated[
+        str | None, Option("left_sweep, bus.left, pose ..., or all", metavar="component", offers="{joint}")
+    ] = None,
     kind: Annotated[
         str | None, Option("off, stuck, garbage, slow, intermittent ..., or ok to end the failure", metavar="kind")
     ] = None,

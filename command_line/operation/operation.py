@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.drive_state import torque_state
+from command_line.drive_state import supply_text, torque_state
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
 from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
+from control.computing.suggestion import suggestion
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
@@ -26,6 +27,7 @@ from operator_client.status_client import DroppedError, NoDaemonError, StatusCli
 
 ARMING_S = 5.0
 CLEARING_S = 1.5
+LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
 
@@ -63,7 +65,8 @@ def walk(
     socket: Socket,
     json: Json = False,
     depth: Annotated[  # the daemon knows the robot's limit
-        float | None, Option("insertion depth of every stride", unit="cm", above=0.0, alternative="depth")
+        float | None,
+        Option("insertion depth of every stride", unit="cm", low=LEAST_DEPTH_CM, high=20.0, alternative="depth"),
     ] = None,
     adaptive: Annotated[
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
@@ -102,7 +105,7 @@ def joint_angle(text: str) -> tuple[str, float]:
 
     joint, _, angle_deg = text.partition("=")
     if joint and joint not in JOINTS:
-        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; there are {', '.join(JOINTS)}")
+        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; {suggestion(joint, JOINTS)}")
     with suppress(ValueError):
         if joint and isfinite(float(angle_deg)):
             return joint, float(angle_deg)
@@ -111,7 +114,8 @@ def joint_angle(text: str) -> tuple[str, float]:
 
 def move(
     angles: Annotated[
-        tuple[tuple[str, float], ...], Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle)
+        tuple[tuple[str, float], ...],
+        Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle, offers="{joint}="),
     ],
     *,
     socket: Socket,
@@ -262,7 +266,18 @@ def _cause_text(cause: dict[str, Any]) -> str:
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:
     rows = [
-        ("joint", "angle (°)", "current (A)", "torque (N·m)", "motor (°C)", "bus (V)", "age (ms)", "torque", "errors")
+        (
+            "joint",
+            "angle (°)",
+            "current (A)",
+            "torque (N·m)",
+            "motor (°C)",
+            "supply (V)",
+            "(A)",
+            "age (ms)",
+            "torque",
+            "errors",
+        )
     ]
     for drive in drives:
         angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
@@ -274,6 +289,7 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
                 number(drive["torque_command_nm"], 3),
                 number(drive["temperature_c"], 0),
                 number(drive["bus_voltage_v"], 1),
+                number(drive["bus_current_a"], 1),
                 number(None if age_s is None else 1e3 * age_s, 1),
                 torque_state(drive),
                 drive["errors"] or "-",
@@ -296,6 +312,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"supply {supply_text(report)}",
             f"pose   {poses if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
             + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")

@@ -1,6 +1,7 @@
 """Describes walks for their logs: `mudskipper trial` and `mudskipper note`."""
 
 import argparse
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from command_line import exit_codes
@@ -25,6 +26,13 @@ KeyValues = Annotated[
 ]
 
 
+def show(trial_of: Mapping[str, Mapping[str, str]]) -> None:
+    """Print descriptions side by side, each below its head."""
+    keys = dict.fromkeys(key for described in trial_of.values() for key in described)
+    rows = [[key, *(described.get(key, "-") for described in trial_of.values())] for key in keys]
+    print(table([["", *trial_of], *rows]) if rows else "no description is set")
+
+
 def trial(
     action: Annotated[Literal["show", "set"], Option("(default: show)", metavar="set")] = "show",
     values: KeyValues = (),
@@ -40,9 +48,7 @@ def trial(
     if json:
         print_value(report)
     else:
-        keys = dict.fromkeys([*report["defaults"], *report["present"]])
-        rows = [[key, *(report[of].get(key, "-") for of in ("defaults", "present"))] for key in keys]
-        print(table([["", "default", "this walk, or the last"], *rows]) if rows else "no description is set")
+        show({"default": report["defaults"], "this walk, or the last": report["present"]})
     return exit_codes.OK
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.text import Text
 
-from command_line.drive_state import is_stale, torque_state
+from command_line.drive_state import is_stale, supply_text, torque_state
 from command_line.operation.attended_walk import MILD
 from command_line.screen import clock_text
 from command_line.watch.history import History
@@ -150,7 +150,7 @@ def _age(age_s: float | None) -> str:
 
 
 def machine_text(history: History, roomy: bool) -> Text:
-    """Return loop, log and lease in one line, or, where there is room, more of them in three."""
+    """Return loop, log, lease and supply in one line, or, where there is room, more of them in four."""
     report, apart = history.status, "\n" if roomy else "  "
     loop, late, tick = report["loop"], report["loop"]["wake_late_us"], report["loop"]["tick_us"]
     times = f"late {late['p50']:.0f}, 99 % {late['p99']:.0f} us, tick {tick['p50']:.0f}, 99 % {tick['p99']:.0f} us"
@@ -161,6 +161,7 @@ def machine_text(history: History, roomy: bool) -> Text:
         (f"{loop['missed_ticks']} missed", WARNING if loop["missed_ticks"] else ""),
         (f"{apart}log ", "bold"), _log(report["log"], roomy),
         (f"{apart}lease ", "bold"), (lease, WARNING if report["lease"] else "dim"),
+        (f"{apart}supply ", "bold"), supply_text(report),
     )  # fmt: skip
 
 

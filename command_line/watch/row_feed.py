@@ -20,7 +20,10 @@ from operator_client.status_client import NotPermittedError
 
 MOST_PACKETS = 1000  # in one call: the daemon may send faster than this program reads
 TICK = ROW_KINDS[TICK_KIND].topic
-DRIVE_FIELDS = ("angle_rad", "velocity_rad_s", "current_a", "angle_age_s", "current_age_s", "torque_command_nm")
+DRIVE_FIELDS = (
+    *("angle_rad", "velocity_rad_s", "current_a", "angle_age_s", "current_age_s", "torque_command_nm"),
+    *("bus_voltage_v", "bus_current_a"),
+)
 LOADS = {  # of a flipper in the status -> field of a row
     "sweep_torque_nm": "sweep_load_nm",
     "adduction_torque_nm": "adduction_load_nm",

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
+from control.computing.suggestion import suggestion
 from control.records import NEVER_S
 from drivers.can.can_fd import fd_options
 from drivers.can.frames import Frame, without_stamps
@@ -27,6 +28,7 @@ from drivers.can.stamp_clock import StampClock
 PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError, AssertionError)
 MOST_FAILURES_PER_READ = 32
 ECHOING_INTERFACES = ("udp_multicast",)
+ECHO = "it would receive its own frames, which look like another program's commands"
 
 
 class CanPort(Protocol):
@@ -151,17 +153,26 @@ def message_from(frame: Frame) -> can.Message:
     )
 
 
+def interface_problem(interface: str) -> str:
+    """Return why an interface cannot be used; empty where it can."""
+    if interface in ECHOING_INTERFACES:
+        return ECHO
+    if interface not in can.VALID_INTERFACES:
+        return f"python-can has no such interface; {suggestion(interface, sorted(can.VALID_INTERFACES))}"
+    return ""
+
+
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool], fd: bool = False) -> CanPort:
-    """Open an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py.
+    """Open an interface; raises whatever its python-can driver raises where it does not open: see buses.py.
 
     With `fd` it also carries CAN FD frames; ValueError is raised where it cannot.
 
     The configuration files and environment variables of python-can are ignored: they would add a user's own options to
     the bus, and reading them leaves garbage in cycles, which a process without a garbage collector never frees.
     """
-    if interface in ECHOING_INTERFACES or options.get("receive_own_messages"):
-        raise ValueError("it would receive its own frames, which look like another program's commands")
-    logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame
+    if problem := ECHO if options.get("receive_own_messages") else interface_problem(interface):
+        raise ValueError(problem)
+    logging.getLogger("can").setLevel(logging.CRITICAL)  # the exceptions say it too; debug would format every frame
     more: dict[str, Any] = (fd_options(interface, channel) if fd else {}) | options
     bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **more)
     if isinstance(bus, SocketcanBus):

@@ -19,7 +19,7 @@ from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
 from drivers.mit import codec
 from drivers.mit.parameters import MitParameters
-from drivers.mit.settings import MitSettings
+from drivers.mit.settings import FLOAT, SUPPLY_V, MitSettings
 from drivers.setpoint_monitor import TOLERANCE_NM, SetpointMonitor
 
 MASTER_ID = 0  # under which older CubeMars answer, all of a bus
@@ -39,6 +39,7 @@ class MitAxis(AnsweringAxis):
         super().__init__(joint, parameters.sign, outlet, setpoints)
         self.parameters = parameters
         self._ranges = parameters.ranges
+        self._supply_request = Frame(codec.REGISTER_ID, codec.encode_read(parameters.node_id, SUPPLY_V))
         self._zero_rad = TURN_RAD * parameters.zero_turn
         self._amperes_per_nm = self._sign / parameters.reported_constant_nm_a
         self.settings = MitSettings(parameters)
@@ -60,9 +61,12 @@ class MitAxis(AnsweringAxis):
         return {node_id: self._receive_shared, MASTER_ID: self._receive_master}
 
     def _receive(self, data: bytes, now_s: float) -> None:
-        """Handle what arrives under a Damiao's MST_ID. Only an idle drive is asked for registers."""
+        """Handle what arrives under a Damiao's MST_ID: the answer of a drive in the mode is never like a register's."""
         if codec.is_register_answer(data, self.parameters.node_id):
             _, _, register, value = codec.decode_register(data)
+            if register == SUPPLY_V:
+                (self._bus_voltage_v,), self._bus_voltage_stamp_s = FLOAT.unpack(value), now_s
+                return
             self.settings.on_register(register, value)
             self._health = None
         else:
@@ -170,6 +174,11 @@ class MitAxis(AnsweringAxis):
     def clear_errors(self) -> None:
         """Clear a Damiao's errors; those of a CubeMars end with their cause or with its supply."""
         self._transmit(codec.CLEAR if self._ranges.has_registers else codec.LEAVE)
+
+    def request_supply(self) -> None:
+        """Ask a Damiao for its voltage; neither maker's drives report the current of their supply."""
+        if self._ranges.has_registers:
+            self._outlet.send(self._supply_request)
 
     def request_settings(self, now_s: float) -> None:
         request = self.settings.due_request(now_s)

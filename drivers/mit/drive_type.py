@@ -14,6 +14,7 @@ from drivers.mit.bench import MitBench
 from drivers.mit.gate_table import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import LARGEST_ID, MitParameters
+from drivers.mit.settings import SUPPLY_V
 from drivers.transmit_gate import GateTable
 
 # All other signals of an answer arrive together or not at all: no code says that one is unknown.
@@ -71,7 +72,7 @@ class Mit(DriveType):
         if identifier < DAMIAO_OFFSET and data[:1] != bytes([node_id]):
             return FrameContent(node_id, is_command=True)
         if identifier > DAMIAO_OFFSET and codec.is_register_answer(data, node_id):
-            return FrameContent(node_id)
+            return FrameContent(node_id, signals=("voltage",) * (data[3] == SUPPLY_V))
         of_damiao = identifier > DAMIAO_OFFSET
         return FrameContent(node_id, signals=SIGNALS, spans=ROTOR_TEMPERATURE if of_damiao else DRIVE_TEMPERATURE)
 

@@ -7,7 +7,7 @@ exactly, so while the gate is closed not even the nearest one leaves: leaving th
 
 from drivers.mit import codec
 from drivers.mit.parameters import MitParameters
-from drivers.mit.settings import REGISTERS
+from drivers.mit.settings import REGISTERS, SUPPLY_V
 from drivers.transmit_gate import GateTable
 
 
@@ -17,7 +17,7 @@ def gate_table(drive: MitParameters) -> GateTable:
     if ranges.has_registers:
         always = {
             node_id: frozenset({codec.LEAVE, codec.CLEAR}),
-            codec.REGISTER_ID: frozenset(codec.encode_read(node_id, register) for register in REGISTERS),
+            codec.REGISTER_ID: frozenset(codec.encode_read(node_id, register) for register in (*REGISTERS, SUPPLY_V)),
         }
     return GateTable(
         node_id=node_id,

@@ -65,6 +65,8 @@ class MoteusAxis(AnsweringAxis):
     def _receive(self, data: bytes, now_s: float) -> None:
         if len(data) == codec.REPLY_BYTES and data[0] == codec.FIRST_REPLY_BYTE:
             self._receive_signals(data, now_s)
+        elif (power_w := codec.decode_power(data)) is not None:
+            self._bus_current_a = power_w / self._bus_voltage_v if self._bus_voltage_v > 0.0 else UNKNOWN
         else:
             self._receive_settings(data, now_s)
 
@@ -190,6 +192,10 @@ class MoteusAxis(AnsweringAxis):
         """Stop the drive, which clears a fault and the latched time-out."""
         self._reason, self._health = 0, None
         self._transmit(codec.STOP_AND_QUERY)
+
+    def request_supply(self) -> None:
+        """Ask for the motor's power: divided by the voltage, it is the current without what the drive takes itself."""
+        self._outlet.send(codec.command_frame(self.parameters.node_id, codec.POWER_QUERY))
 
     def request_settings(self, now_s: float) -> None:
         request = self.settings.due_request(now_s)

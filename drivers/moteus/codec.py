@@ -38,6 +38,8 @@ STOP = bytes.fromhex("010000")
 # temperature and fault as int8; torque of the drive's controller as int16
 QUERY = bytes.fromhex("1100 1e01 1d04 110a 130d 153a")
 QUERY_ALONE, STOP_AND_QUERY = padded(QUERY), padded(STOP + QUERY)
+POWER_QUERY = bytes.fromhex("1d07")  # the motor's electrical power as float, which no answer of a tick has
+_POWER_REPLY = bytes.fromhex("2d07")
 _FLOAT = Struct("<f")
 _TORQUE_HEAD = bytes.fromhex("01000a 02208000 0d22")  # position mode; position NaN, velocity 0; torque as float
 _TORQUE_TAIL = bytes.fromhex("02230000 012b00") + QUERY  # scales of kp, kd and the integrator's limit 0
@@ -135,6 +137,14 @@ def decode_torque(data: bytes) -> float:
     if len(data) != TORQUE_BYTES or data[:end] != _TORQUE_HEAD or data[end + _FLOAT.size :] != _TORQUE_TAIL:
         return nan
     return float(_FLOAT.unpack_from(data, end)[0])
+
+
+def decode_power(data: bytes) -> float | None:
+    """Return the motor's power in W from the answer to POWER_QUERY; None for any other payload."""
+    end = len(_POWER_REPLY) + _FLOAT.size
+    if len(data) < end or data[: len(_POWER_REPLY)] != _POWER_REPLY:
+        return None
+    return float(_FLOAT.unpack_from(data, len(_POWER_REPLY))[0])
 
 
 def encode_reply(reply: Reply) -> bytes:

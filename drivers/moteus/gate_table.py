@@ -10,6 +10,7 @@ from drivers.moteus.parameters import MoteusParameters
 from drivers.moteus.settings import IDENTITY, POLL, QUESTIONS
 from drivers.transmit_gate import FrameKind, GateTable
 
+QUERIES = (codec.QUERY_ALONE, codec.STOP_AND_QUERY, codec.POWER_QUERY, IDENTITY, POLL, *QUESTIONS)
 KIND = FrameKind(is_extended=True, is_fd=True, bit_rate_switch=True)
 
 
@@ -20,7 +21,7 @@ def gate_table(drive: MoteusParameters) -> GateTable:
         torque_id=identifier,
         zero_torque=codec.encode_torque(0.0),
         decode_torque=codec.decode_torque,
-        always={identifier: frozenset({codec.QUERY_ALONE, codec.STOP_AND_QUERY, IDENTITY, POLL, *QUESTIONS})},
+        always={identifier: frozenset(QUERIES)},
         kind=KIND,
         idle=codec.QUERY_ALONE,
     )

@@ -39,6 +39,7 @@ class Register(IntEnum):
     TORQUE = 0x003
     Q_CURRENT = 0x004
     D_CURRENT = 0x005
+    POWER = 0x007
     MOTOR_TEMPERATURE = 0x00A
     VOLTAGE = 0x00D
     BOARD_TEMPERATURE = 0x00E
@@ -72,6 +73,7 @@ SCALES = {  # of int8, int16, int32; registers without a line are plain integers
     Register.TORQUE: _TORQUE,
     Register.Q_CURRENT: _CURRENT,
     Register.D_CURRENT: _CURRENT,
+    Register.POWER: (10.0, 0.05, 0.0001),
     Register.MOTOR_TEMPERATURE: _TEMPERATURE,
     Register.VOLTAGE: _VOLTAGE,
     Register.BOARD_TEMPERATURE: _TEMPERATURE,

@@ -26,6 +26,7 @@ from drivers.odrive.settings import DriveSettings
 from drivers.setpoint_monitor import SetpointMonitor
 
 RESTART_SILENCE_S = 0.3  # three heartbeats
+SUPPLY_SILENCE_S = 0.25  # of a message that is sent every 0.1 s
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
@@ -48,6 +49,7 @@ class CanSimpleAxis(DriveSignals):
         self._rad_per_turn = self._sign * TURN_RAD
         self._current_sign = self._sign * parameters.current_sign
         self._setpoint_nm_a = parameters.current_sign * parameters.torque_constant_nm_a
+        self._supply_request = Frame(arbitration_id(parameters.node_id, codec.GET_BUS_VOLTAGE_CURRENT), is_remote=True)
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
         self.reset()
@@ -72,7 +74,7 @@ class CanSimpleAxis(DriveSignals):
         return {
             codec.GET_ENCODER_ESTIMATES: self._receive_encoder,
             codec.GET_IQ: self._receive_current,
-            codec.GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
+            codec.GET_BUS_VOLTAGE_CURRENT: self._receive_supply,
             codec.GET_VERSION: self._receive_version,
         }
 
@@ -132,8 +134,8 @@ class CanSimpleAxis(DriveSignals):
         self.settings.forget()
         self._health = None
 
-    def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
-        self._bus_voltage_v, _ = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
+    def _receive_supply(self, data: bytes, now_s: float) -> None:
+        self._bus_voltage_v, self._bus_current_a = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
         self._bus_voltage_stamp_s = now_s
 
     def _receive_version(self, data: bytes, now_s: float) -> None:
@@ -184,6 +186,11 @@ class CanSimpleAxis(DriveSignals):
 
     def poll(self) -> None:
         """Does nothing: an ODrive reports by itself."""
+
+    def request_supply(self) -> None:
+        """Ask a drive that does not report its supply by itself."""
+        if self._read_s - self._bus_voltage_stamp_s > SUPPLY_SILENCE_S:
+            self._outlet.send(self._supply_request)
 
     def request_settings(self, now_s: float) -> None:
         for frame in self.settings.due_requests(self.parameters.node_id, now_s):

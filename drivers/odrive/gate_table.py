@@ -45,7 +45,10 @@ def cansimple_table(
         always={arbitration_id(drive.node_id, message): frozenset({data}) for message, data in always.items()},
         while_open={arbitration_id(drive.node_id, codec.SET_AXIS_STATE): frozenset({closed_loop})},
         checks={arbitration_id(drive.node_id, message): check for message, check in checks.items()},
-        requests=frozenset(Frame(arbitration_id(drive.node_id, message), is_remote=True) for message in requests),
+        requests=frozenset(
+            Frame(arbitration_id(drive.node_id, message), is_remote=True)
+            for message in (*requests, codec.GET_BUS_VOLTAGE_CURRENT)
+        ),
     )
 
 

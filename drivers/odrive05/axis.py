@@ -204,6 +204,10 @@ class Odrive05Axis(CanSimpleAxis):
             self._health = None
         super().clear_errors()
 
+    def request_supply(self) -> None:
+        if not self._proof.silent:
+            super().request_supply()
+
     def request_settings(self, now_s: float) -> None:
         """Ask for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has."""
         if self._proof.silent:

@@ -13,7 +13,7 @@ from drivers.odrive.codec import GET_VERSION
 from drivers.odrive05.codec import GET_ENCODER_COUNT
 
 NAME, FIRMWARE = "odrive05", "0.5"
-NO_SETTINGS = "firmware 0.5 has no messages for its settings: use odrivetool over USB, and see docs/how-to/odrive.md"
+NO_SETTINGS = "firmware 0.5 has no messages for its settings: use odrivetool over USB, and see docs/how-to/odrive05.md"
 UNKNOWN = "it sends a heartbeat, and reports neither a version nor the counts of its encoder"
 
 

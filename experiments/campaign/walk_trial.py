@@ -14,7 +14,7 @@ from experiments.campaign.points import Tables
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import EVENT_KIND, STRIDE_KIND, TICK_KIND, row_kinds
-from logs.catalogue.entry import LogEntry
+from logs.catalogue.entry import LogEntry, values_of_entry
 from logs.catalogue.log_contents import entry_of_log
 from logs.files.log_reader import Log
 from logs.files.tick_array import divide_ticks
@@ -59,7 +59,7 @@ def run_walk(tables: Tables, seed: int) -> dict[str, Any]:
     except RuntimeError as problem:  # of a robot that is not armed, or does not walk
         entry = entry._replace(state=BROKEN, reason=str(problem))
     entry = entry_of_log(entry, recorder.log(planned.configuration))
-    return entry._asdict() | {"muds": [mud._asdict() for mud in entry.muds], "faults": list(entry.faults)}
+    return values_of_entry(entry)
 
 
 def _walk(planned: PlannedWalk, recorder: MemoryRecorder, seed: int) -> None:

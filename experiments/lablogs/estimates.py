@@ -47,6 +47,7 @@ class EvaluatedLog(NamedTuple):
     in_mud: bool
     estimates: DataFrame
     findings: tuple[str, ...] = ()  # peculiarities of the file
+    mud: str = ""  # that the log names
 
 
 class Refusal(NamedTuple):
@@ -72,7 +73,15 @@ def read_log(paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS) -> Ev
     except (ValueError, ArithmeticError, LookupError) as defect:  # of this program; the other logs are still evaluated
         return Refusal(name, f"{paths[0]}: cannot be evaluated: {type(defect).__name__}: {defect}")
     estimates = pandas.concat(frames, ignore_index=True)
-    return EvaluatedLog(name, recording.flippers, recording.fixed_base, in_mud, estimates, recording.findings)
+    return EvaluatedLog(
+        name=name,
+        flippers=recording.flippers,
+        fixed_base=recording.fixed_base,
+        in_mud=in_mud,
+        estimates=estimates,
+        findings=recording.findings,
+        mud=recording.mud,
+    )
 
 
 def _runs(name: str, recording: Recording, disturbed: bool) -> Iterator[tuple[str, int, Recording]]:

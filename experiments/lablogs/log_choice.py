@@ -1,6 +1,7 @@
-"""The logs in folders, and the group of repetitions that each belongs to by its file name.
+"""The logs in folders, and the group of repetitions that each belongs to.
 
-A group is a mud: by default the lab's label in the name, `12.5N` of `single_12.5N_trial1.csv.gz`. The muds of walks are
+A group is a mud: the one that a log of this project names, or the label in the name of a file of the paper's authors,
+`12.5N` of `single_12.5N_trial1.csv.gz`; a pattern for the names of files replaces both. The muds of walks are
 groups of their own, `walk 15.6N`, because a walking robot does not repeat a stroke.
 """
 
@@ -11,11 +12,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from experiments.study.option import OptionError
+from firmware_host.log.log_folder import SEGMENT
 
 ENDINGS = (".csv", ".csv.gz", ".mcap")
 LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
 KIND = re.compile(r"(?:^|[^A-Za-z])(single|walk)(?:ing)?(?![A-Za-z])", re.IGNORECASE)
-SEGMENT = re.compile(r"(.*)-\d{4}\.mcap")
 Paths = tuple[Path, ...]
 
 
@@ -48,10 +49,14 @@ def find_logs(folders: Sequence[Path]) -> list[Paths]:
 
 
 def _first_segment(path: Path, paths: Sequence[Path]) -> Path:
-    """Return the first segment of the run, where it is among the paths, else the path itself."""
-    segment = SEGMENT.fullmatch(path.name)
-    first = path.with_name(f"{segment[1]}-0000.mcap") if segment else path
-    return first if first in paths else path
+    """Return the first of the segments of the run that follow each other up to this one, all of one trial."""
+    while segment := SEGMENT.fullmatch(path.stem):
+        number, trial = int(segment["number"]), segment["trial"] or ""
+        before = path.with_name(f"{segment['run']}-{number - 1:04d}{trial}{path.suffix}")
+        if number == 0 or before not in paths:
+            break
+        path = before
+    return path
 
 
 def matches(name: str, pattern: str) -> bool:
@@ -60,10 +65,10 @@ def matches(name: str, pattern: str) -> bool:
     return fnmatchcase(name, pattern) or fnmatchcase(stem, pattern)
 
 
-def group_of(name: str, rules: Sequence[GroupRule]) -> str | None:
-    """Return the group of the first rule that matches, else that of the label in the name, else None."""
+def group_of(name: str, rules: Sequence[GroupRule], mud: str = "") -> str | None:
+    """Return the group of the first rule that matches, else the log's own mud, or the label in the name, else None."""
     ruled = next((rule.name for rule in rules if matches(name, rule.pattern)), None)
-    return ruled or _labelled_group(name)
+    return ruled or mud or _labelled_group(name)
 
 
 def _labelled_group(name: str) -> str | None:

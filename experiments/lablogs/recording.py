@@ -17,6 +17,7 @@ from control.records import StrideEstimate
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.files.log_reader import Log, read_logs
+from logs.files.log_summary import trial_of
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.columns import PAPER_CONSTANT_NM_A
 from logs.lab.joint_signs import find_evidence
@@ -41,6 +42,7 @@ class Recording:
     rows: Rows  # those that are not missing
     replay: Callable[[Method, Floats, Rows], list[StrideEstimate]]  # with these currents and rows; raises LogError
     findings: tuple[str, ...] = ()  # peculiarities that the reader noticed
+    mud: str = ""  # that the log names
     torque_scale: float = 1.0  # torque constant over that of the authors' motors
 
     def estimate_strides(self, method: Method) -> list[StrideEstimate]:
@@ -110,6 +112,7 @@ def recording_of_log(path: Path, log: Log) -> Recording:
         current_a=ticks["current_a"],
         rows=np.full(len(ticks), True),
         replay=replay,
+        mud=trial_of(log).get("mud", ""),
         torque_scale=configuration.flipper_drives[0].sweep_constant_nm_a / PAPER_CONSTANT_NM_A,
     )
 

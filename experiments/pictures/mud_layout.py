@@ -1,7 +1,7 @@
 """Which mud is where: named muds along the track, or those that the robot noticed, described by their coefficient k_p.
 
-A log does not name muds. Who prepared them can: as lengths along the track, or as the world of a simulated robot.
-Without names a mud begins with the stride after which the robot noticed it.
+The description of a walk names one mud. Who prepared several can name them: as lengths along the track, or as the world
+of a simulated robot. Without names a mud begins with the stride after which the robot noticed it.
 """
 
 from collections.abc import Sequence

@@ -29,12 +29,17 @@ from experiments.run_report.results import (
 )
 from experiments.run_report.run import MudsFrom, Run
 from experiments.study.result import Figure, Result, Table
+from firmware_host.trial import read_report
 from logs.fault_history import BEGUN, OVER
-from logs.files.log_summary import log_summary
+from logs.files.log_summary import log_summary, operator_reports
 
 CM = 0.01  # in metres
-UNITS = dict.fromkeys(("first at", "last at", "from"), "s") | dict.fromkeys(("depth", "step"), "cm")
-UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {"distance": "m", "speed": "cm/s"}
+UNITS = dict.fromkeys(("first at", "last at", "at", "from"), "s") | dict.fromkeys(("depth", "step"), "cm")
+UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {
+    "distance": "m",
+    "speed": "cm/s",
+    "lowest supply": "V",
+}
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
 SINCE = "Times count from the beginning of the log."
 UNCERTAINTY = (
@@ -43,6 +48,7 @@ UNCERTAINTY = (
 )
 ORIGINS = {
     MudsFrom.NAMES: "The muds are those that you named.",
+    MudsFrom.LOG: "The mud is the one that the log names.",
     MudsFrom.FILE: "The mud is the label in the name of the file.",
     MudsFrom.ROBOT: "The log names no muds: each is one that the robot noticed, described by its k_p.",
 }
@@ -94,6 +100,9 @@ def run_result(run: Run, headline: Entry) -> Result:
     if run.log:
         groups = group_events(run.log.events, begin_s)
         text = f"{SINCE} Events that differ only in numbers are one row, with the range of the numbers."
+        if reports := _report_rows(run, begin_s):
+            texts["Notes"] = f"What operators wrote into the log. {SINCE}"
+            tables.append(_table("Notes", reports))
         texts |= {"Events": text if groups else "None.", "Log": ""}
         summary = [{"field": name, "value": value} for name, value in log_summary(run.log).items()]
         tables += [_table("Events", groups), _table("Log", summary)]
@@ -196,11 +205,25 @@ def _cause_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
     ]
 
 
+def _report_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
+    reports = operator_reports(run.log.events) if run.log else []
+    return [
+        {
+            "at": stamp_s - begin_s,
+            "universal time": f"{report.time:%Y-%m-%d %H:%M:%S.%f}"[:-3],
+            "kind": report.kind,
+            "text": report.text,
+            "by": report.by,
+        }
+        for stamp_s, report in reports
+    ]
+
+
 def group_events(events: Iterable[Mapping[str, Any]], begin_s: float) -> list[dict[str, Any]]:
-    """Group events that differ only in their numbers, without faults, which are grouped by their causes."""
+    """Group events that differ only in their numbers, without faults and notes, which have tables of their own."""
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for event in events:
-        if not (BEGUN.fullmatch(event["text"]) or OVER.fullmatch(event["text"])):
+        if not any(read(event["text"]) for read in (BEGUN.fullmatch, OVER.fullmatch, read_report)):
             groups.setdefault(NUMBER.sub("#", event["text"]), []).append(event)
     return [
         {
@@ -246,6 +269,7 @@ def stride_rows(run: Run) -> list[dict[str, Any]]:
             "from": f"{stride['start_s']:.2f}",
             "depth": f"{stride['depth_m'] / CM:z.1f}",
             "step": f"{stride['step_m'] / CM:z.1f}".replace("nan", "-"),
+            "lowest supply": f"{stride['supply_v']:.1f}".replace("nan", "-"),
             "outcome": stride["outcome"] + ", two surfaces" * bool(stride["two_surfaces"]),
         }
         for stride in run.strides.to_dict("records")

@@ -28,7 +28,9 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
+from firmware_host.trial import KEYS, Trial
 from logs.fault_history import LoggedCause
+from logs.files.log_summary import trial_of
 
 Entry = dict[str, Any]  # of the JSON of a report
 Value = tuple[float | None, float | None]  # with its standard error
@@ -42,6 +44,7 @@ def headline_of(run: Run) -> Entry:
     reactions = [reaction_of(cause) for cause in run.causes]
     muds = run.strides[run.strides["mud"] != ""].groupby("mud", sort=False)
     return {
+        "trial": trial_of(run.log) if run.log else {},
         "walks": len(run.walks),
         **travel_of(run.walks),
         "strides": len(run.strides),
@@ -124,12 +127,19 @@ def headline_sentences(run: Run, headline: Entry) -> list[str]:
     strides, outcomes = headline["strides"], headline["outcomes"]
     known = [f"{outcomes[outcome]} {doing}" for outcome, doing in DOING.items() if outcomes[outcome]]
     text = f"{counted(strides, 'stride')}{': ' * bool(known)}{', '.join(known)}." if strides else "No complete stride."
-    sentences = [_travel_sentence(headline), text]
+    sentences = [*trial_sentences(headline["trial"]), _travel_sentence(headline), text]
     if run.log:
         stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
         warnings = f"; {counted(headline['warnings'], 'warning')}" * bool(headline["warnings"])
         sentences.append(f"{stops}{warnings}.")
     return sentences
+
+
+def trial_sentences(trial: Trial) -> list[str]:
+    """Return the description of a trial in a sentence, the usual keys first; none without one."""
+    keys = [*[key for key in KEYS if key in trial], *[key for key in trial if key not in KEYS]]
+    text = ", ".join(f"{key} {trial[key]}{' %' * (key == 'water')}" for key in keys)
+    return [f"{text[0].upper()}{text[1:]}."] if text else []
 
 
 def _travel_sentence(headline: Entry) -> str:

@@ -1,8 +1,8 @@
 """A recorded run for a report: its walks, its strides with mud and outcome, and their estimates with the fits.
 
 A stride lasts from its insertion to the next one; the last of a walk has no duration. Its mud is the one that is named
-there (mud_layout.py), the label in the name of a CSV such as 12.5N, or else the one that the robot noticed, described
-by its k_p.
+there (mud_layout.py), the mud of the log's trial, the label in the name of a CSV such as 12.5N, or else the one that
+the robot noticed, described by its k_p.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,11 +23,12 @@ from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_o
 from experiments.pictures.stride_choice import Stride, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.mud_names import mud_label
+from experiments.reports.mud_names import mud_label, mud_name
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes
 from logs.files.log_error import LogError, Watch
 from logs.files.log_reader import TickPass
+from logs.files.log_summary import trial_of
 from logs.files.scanned_log import ScannedLog, join_logs, scan_log
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.lab_csv import is_lab_csv, read_lab_csv
@@ -35,7 +36,7 @@ from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
-STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces")
+STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces", "supply_v")
 ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", "estimate", "samples")
 
 
@@ -43,6 +44,7 @@ class MudsFrom(StrEnum):
     """Who named the muds of a run."""
 
     NAMES = "names"  # given with the report
+    LOG = "log"  # which the operator described when the walk began
     FILE = "file name"
     ROBOT = "robot"  # which noticed them: they are described by their k_p
 
@@ -91,9 +93,11 @@ def _read_run(
         replay, walks = replay_lab(lab), [walk_of_lab(path, lab)] if lab.flippers else []
     else:
         replay, walks = _read_ticks(path, log, watch)
-    muds_from = MudsFrom.NAMES if layout else MudsFrom.FILE if label else MudsFrom.ROBOT
-    if layout is None and label:
-        layout = MudLayout((f"{label[1][:-1]} N",), (inf,))
+    described = trial_of(log).get("mud") if log else None
+    named = described or (f"{label[1][:-1]} N" if label else "")
+    muds_from = MudsFrom.NAMES if layout else MudsFrom.LOG if described else MudsFrom.FILE if label else MudsFrom.ROBOT
+    if layout is None and named:
+        layout = MudLayout((mud_name(named),), (inf,))
     layout = _placed(path, layout, walks)
     strides, estimates = _describe_strides(replay, walks, layout)
     return Run(
@@ -169,6 +173,7 @@ def _motion_of(walk: RecordedWalk, rows: Mapping[str, Stride], first: Stride, en
         "step_m": first["step_m"],
         "depth_m": max(float(row["depth_m"]) for row in rows.values()),
         "outcome": str(outcome_of(together, walk.geometric_step_m)),
+        "supply_v": min((v for row in rows.values() if isfinite(v := row.get("supply_min_v", nan))), default=nan),
         "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows.values()),
     }
 

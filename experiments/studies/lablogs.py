@@ -5,6 +5,7 @@ flipper against the right one, mud against air, and each log against itself with
 """
 
 from collections.abc import Sequence
+from errno import ENOTDIR
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -31,7 +32,7 @@ FIGURES = {
 Groups = Annotated[
     tuple[GroupRule, ...],
     Option(
-        "put logs with such a file name into one group (default: the label in the name, as 12.5N)",
+        "put logs with such a file name into one group (default: the mud that the log names, or a label, as 12.5N)",
         metavar="PATTERN=NAME",
         parse=parse_rule,
     ),
@@ -64,7 +65,7 @@ def study(
     measured = [each for each in read if isinstance(each, EvaluatedLog)]
     if air:
         measured = [log._replace(in_mud=not any(matches(log.name, each) for each in air)) for log in measured]
-    groups = [group_of(log.name, group) for log in measured]
+    groups = [group_of(log.name, group, log.mud) for log in measured]
     estimates = join_estimates(measured, groups)
     summary = summary_of(measured, groups, estimates, refused)
     return Result(
@@ -81,10 +82,10 @@ def study(
 
 
 def _logs_in(folders: Sequence[Path], patterns: Sequence[str]) -> list[Paths]:
-    """Return the logs. Raises OptionError for a folder without logs, and for a pattern that no log matches."""
+    """Return the logs. Raises OptionError for a folder without logs and a pattern that no log matches, and OSError."""
     for path in folders:
         if not path.exists():
-            raise OptionError(f"{path}: no such folder")
+            raise NotADirectoryError(ENOTDIR, "there is no such folder", str(path))
     logs = find_logs(folders)
     if not logs:
         raise OptionError(f"{folders[0]}: holds no log: no file whose name ends with .csv, .csv.gz or .mcap")

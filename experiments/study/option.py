@@ -37,15 +37,22 @@ class Option(NamedTuple):
     without_value: str | None = None  # the value of an option that is given without one
     name: str = ""  # where it differs from the parameter's
     alternative: str = ""  # options with the same word here exclude each other
+    offers: str = ""  # what a shell's completion offers for each joint, such as "{joint}="
 
     def parse_number(self, text: str) -> float:
-        """Return the number. Raises argparse.ArgumentTypeError outside of the bounds."""
+        """Return the number, which may be followed by the option's own unit.
+
+        Raises argparse.ArgumentTypeError for another text or unit, and outside of the bounds.
+        """
         try:
-            value = float(text)
+            value = float(text.strip().removesuffix(self.unit))
         except ValueError:
             value = nan
-        if not (isfinite(value) and self.low <= value <= self.high and value > self.above):
-            raise ArgumentTypeError(f"{text}: must be {self._bounds() or 'a number'}")
+        if not isfinite(value):
+            parts = (f"a number in {self.unit}" if self.unit else "a number", self._bounds())
+            raise ArgumentTypeError(f"{text}: must be {', '.join(filter(None, parts))}")
+        if not (self.low <= value <= self.high and value > self.above):
+            raise ArgumentTypeError(f"{text}: must be {self._bounds()}")
         return value
 
     def parse_whole_number(self, text: str) -> int:

@@ -25,8 +25,6 @@ def load_truth(path: Path) -> TruthOfMud:
         numbers = [value for mud in truth.values() for value in mud.values()]
         if not all(isinstance(value, int | float) and value > 0.0 for value in numbers):
             raise ValueError("coefficients must be numbers above 0")
-    except OSError as problem:
-        raise BenchError(f"--truth {path}: {problem.strerror}") from problem
     except (ValueError, KeyError, TypeError, AttributeError) as problem:
         raise BenchError(
             f"--truth {path} is no summary with coefficients of muds ({problem}): "

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 
+from control.computing.suggestion import suggestion
 from control.records import FLIPPERS
 from drivers.can.can_fd import CLASSIC_INTERFACES
 from drivers.drive_types import collisions, type_of
@@ -25,8 +26,7 @@ def rig_problems(configuration: Configuration) -> Iterator[str]:
     for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
         for joint in (joint for joint in table if joint not in joints):
             yield (
-                f"{section}.{joint}: there is no such joint; with rig.flippers = {flippers}"
-                f" the joints are {', '.join(joints)}"
+                f"{section}.{joint}: there is no such joint with rig.flippers = {flippers}; {suggestion(joint, joints)}"
             )
 
 
@@ -34,8 +34,7 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
     joint_at: dict[tuple[str, int], str] = {}
     for joint, drive in configuration.drive.items():
         if drive.bus not in configuration.bus:
-            known = ", ".join(configuration.bus) or "none"
-            yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
+            yield f"drive.{joint}.bus = {drive.bus!r}: there is no such bus; {suggestion(drive.bus, configuration.bus)}"
         if drive.sign == 0:
             yield f"drive.{joint}.sign = 0: must be 1 or -1"
         duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)

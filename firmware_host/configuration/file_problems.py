@@ -23,6 +23,10 @@ class ConfigurationError(Exception):
         super().__init__("\n".join(self.problems))
 
 
+class UnreadableFileError(ConfigurationError):
+    """The operating system does not give the file: it is missing, a folder, or another user's."""
+
+
 def _readable(message: str) -> str:
     if len(message) > LONGEST_MESSAGE:
         message = f"{message[: LONGEST_MESSAGE // 2]} [...] {message[-LONGEST_MESSAGE // 2 :]}"

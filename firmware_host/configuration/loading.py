@@ -8,7 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
+from control.computing.suggestion import suggestion
 from control.gait.gait import PROTOCOLS
+from drivers.can.can_port import interface_problem
 from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
@@ -45,9 +47,18 @@ _READER = RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str,
 def load_configuration(path: Path) -> Configuration:
     """Read the file of a robot that is to run. Raises ConfigurationError, also for a file that cannot be read.
 
-    Unlike the text in a log, which may be of an earlier version, it needs a reason for weakened protection.
+    Unlike the text in a log, which may be of an earlier version or another computer, it needs a reason for weakened
+    protection and interfaces that are installed.
     """
-    return require_reason(parse_configuration(read_text(path), path))
+    configuration = parse_configuration(read_text(path), path)
+    problems = [
+        f"bus.{name}.interface = {bus.interface!r}: {problem}"
+        for name, bus in configuration.bus.items()
+        if (problem := interface_problem(bus.interface))
+    ]
+    if problems:
+        raise ConfigurationError(problems)
+    return require_reason(configuration)
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
@@ -77,7 +88,7 @@ def _require_known_types(document: dict[str, Any]) -> None:
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
     known = tuple(DRIVE_TYPES)  # not the dictionary: a malformed type may not be hashable
     problems = [
-        f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(known)}"
+        f"drive.{joint}.type = {shown(name)}: there is no such type; {suggestion(str(name), known)}"
         for joint, name in types.items()
         if name not in known
     ]
@@ -103,5 +114,7 @@ def _apply_protocol(document: dict[str, Any]) -> None:
         return
     name = gait.pop("protocol")
     if not isinstance(name, str) or name not in PROTOCOLS:
-        raise ConfigurationError([f"gait.protocol = {name!r}: must be one of {', '.join(PROTOCOLS)}"])
+        raise ConfigurationError(
+            [f"gait.protocol = {name!r}: there is no such protocol; {suggestion(str(name), PROTOCOLS)}"]
+        )
     document["gait"] = asdict(PROTOCOLS[name]) | gait

@@ -6,7 +6,7 @@ bounds; each problem becomes one message with key, value and bound. Tables of an
 """
 
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
@@ -25,7 +25,8 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from control.bounds import Bounds
-from firmware_host.configuration.file_problems import ConfigurationError
+from control.computing.suggestion import similar_name
+from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 
 LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
 
@@ -47,7 +48,7 @@ def read_text(path: Path) -> str:
             raise ConfigurationError([f"{path}: must have at most {LARGEST_FILE_BYTES} bytes"])
         return data.decode("utf-8-sig")
     except OSError as problem:
-        raise ConfigurationError([f"{path}: {problem.strerror}"]) from problem
+        raise UnreadableFileError([f"{path}: {problem.strerror}"]) from problem
     except UnicodeDecodeError as problem:
         line = data.count(b"\n", 0, problem.start) + 1
         raise ConfigurationError([f"{path}: not UTF-8 text (at line {line}); save the file as UTF-8"]) from problem
@@ -109,7 +110,14 @@ class RecordReader:
         try:
             return dict(self._model.model_validate(document))
         except ValidationError as problem:
-            raise ConfigurationError([_message(error) for error in problem.errors()]) from problem
+            raise ConfigurationError([self._message(error) for error in problem.errors()]) from problem
+
+    def _message(self, error: Any) -> str:
+        if error["type"] != "extra_forbidden":
+            return _message(error)
+        *path, name = error["loc"]
+        similar = similar_name(str(name), _keys_at(self._model, path))
+        return f"{_key(error['loc'])}: there is no such key{f'; did you mean {similar}?' if similar else ''}"
 
 
 def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any] | None = None) -> type[BaseModel]:
@@ -125,6 +133,22 @@ def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any
         definitions[item.name] = (_checked_hint(hints[item.name]), default)
     settings = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
     return create_model(record.__name__, __config__=settings, **definitions)
+
+
+def _keys_at(model: type[BaseModel], path: Sequence[object]) -> set[str]:
+    """Return the names of the fields at a place in a document, of every record that it may be there."""
+    models = [model]
+    for part in path:
+        inner = [each.model_fields[str(part)].annotation for each in models if str(part) in each.model_fields]
+        models = [found for hint in inner for found in _models_in(hint)] or models  # a name or number of a table
+    return {name for each in models for name in each.model_fields}
+
+
+def _models_in(hint: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        yield hint
+    for inner in get_args(hint):
+        yield from _models_in(inner)
 
 
 def _checked_hint(hint: Any) -> Any:
@@ -212,8 +236,6 @@ def _message(error: Any) -> str:
     key, value = _key(error["loc"]), shown(error["input"])
     bounds = error.get("ctx", {})
     match error["type"]:
-        case "extra_forbidden":
-            return f"{key}: there is no such key"
         case "missing":
             return f"{key} is missing"
         case "greater_than_equal":

@@ -29,6 +29,7 @@ FLUSH_INTERVAL_S = 0.4  # the death of the writer may cost as much
 SYNC_INTERVAL_S = 1.0  # a power cut may cost as much, and the time of a synchronisation
 LATEST_NS = (1 << 63) - 1
 METADATA = "mudskipper"
+ANNOTATION = "mudskipper_annotation"  # metadata that were added to a closed log; their values replace earlier ones
 EXPORTED = "exported"  # key of the metadata in a copy that `log export --ros` of version 0.2 made
 ATTACHMENT = "configuration.toml"
 

@@ -15,6 +15,7 @@ from control.modes import Mode
 from control.records import (
     FLIPPERS,
     TWO_FLIPPERS,
+    UNKNOWN,
     BodyPose,
     DriveStates,
     FlipperLoad,
@@ -61,6 +62,8 @@ def tick_kind(rig: Rig) -> RowKind:
             Field("stride_depth_m", "float64", "insertion depth chosen for this stride"),
             Field("body_x_m", "float64", "position along the track; NaN without a pose"),
             Field("temperature_c", "float64", "of the motor", rig.joints),
+            Field("bus_voltage_v", "float64", "of the drive's supply", rig.joints),
+            Field("bus_current_a", "float64", "that the drive takes from its supply", rig.joints),
             Field("tick", "uint32", "ticks since the start, missed ones included"),
             Field("missed_ticks", "uint32", "since the start"),
             Field("stride", "int32", "-1 outside of a walk"),
@@ -87,7 +90,9 @@ def tick_row(
 ) -> bytes:
     """Pack the values of one tick, in the order of the table above."""
     now_s = tick.now_s
-    angles_rad, velocities_rad_s, angle_stamps_s, currents_a, current_stamps_s, *_ = zip(*states, strict=True)
+    columns = tuple(zip(*states, strict=True))
+    angles_rad, velocities_rad_s, angle_stamps_s, currents_a, current_stamps_s = columns[:5]
+    temperatures_c, _, voltages_v, _, supply_currents_a = columns[8:]
     return kind.layout.pack(
         CDR_HEADER,
         now_s,
@@ -103,7 +108,9 @@ def tick_row(
         target.depth_m,
         stride_depth_m,
         body.x_m,
-        *[state.temperature_c for state in states],
+        *temperatures_c,
+        *voltages_v,
+        *supply_currents_a,
         tick.number,
         missed_ticks,
         target.stride,
@@ -151,6 +158,7 @@ STRIDE = RowKind(
         Field("tare_drift_n", "float64", "since the stride before"),
         Field("extraction_torque_nm", "float64", "largest one of the mud on adduction"),
         Field("chosen_depth_m", "float64", "insertion depth of the next stride"),
+        Field("supply_min_v", "float64", "lowest of the flipper's drives since its stride before closed"),
         Field("index", "uint32", "number of the stride in its walk"),
         *(Field(f"{name}_samples", "uint32", "distinct ones in the fit") for name in COEFFICIENTS),
         Field("flipper", "uint8", "0 left, 1 right", words=FLIPPERS),
@@ -161,14 +169,15 @@ STRIDE = RowKind(
 )  # fmt: skip
 
 
-def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float) -> bytes:
+def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float, supply_min_v: float = UNKNOWN) -> bytes:
     """Pack a stride that closed at this time: its estimates have the names of the fields."""
     values = {field.name: getattr(stride, field.name, None) for field in STRIDE.fields}
     for name in COEFFICIENTS:
         estimate = getattr(stride, name)
         values |= {name: estimate.value, f"{name}_std_error": estimate.std_error, f"{name}_samples": estimate.samples}
         values |= {f"{name}_valid": estimate.valid, f"{name}_at_least": estimate.at_least}
-    values |= {"stamp_s": now_s, "chosen_depth_m": chosen_depth_m, "flipper": FLIPPERS.index(stride.flipper)}
+    values |= {"stamp_s": now_s, "chosen_depth_m": chosen_depth_m, "supply_min_v": supply_min_v}
+    values["flipper"] = FLIPPERS.index(stride.flipper)
     return STRIDE.encode(*values.values())
 
 

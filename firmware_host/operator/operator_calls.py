@@ -16,7 +16,7 @@ from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
-from control.records import JOINTS
+from control.records import JOINTS, UNKNOWN
 from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -38,7 +38,8 @@ from firmware_host.software_version import is_compiled, software_version
 NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
-MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
+MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
+SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
@@ -112,6 +113,7 @@ class OperatorCalls:
             "pose": loop.pose.report()._asdict(),
             "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
+            "stride_supply_min_v": self._stride_supply_v(),
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
@@ -141,11 +143,18 @@ class OperatorCalls:
             "causes": [cause_report(cause) for cause in causes],
         }
 
+    def _stride_supply_v(self) -> float | None:
+        """Return the lowest voltage of any drive in the last stride."""
+        last = self._loop.learning.strides[-len(self._rig.flippers) :]
+        return known(min([closed.supply_min_v for closed in last], default=UNKNOWN))
+
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Return the first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
         wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
         return [
-            stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            stride_report(closed.estimate)
+            | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            | {"supply_min_v": known(closed.supply_min_v)}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
 
@@ -157,10 +166,10 @@ class OperatorCalls:
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
         trial = self._trials.planned(params)
-        if depth_m is not None and not 0.0 < depth_m <= adaptation.max_depth_m:
+        if depth_m is not None and not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
             raise RefusedError(
-                f"depth {100.0 * depth_m:g} cm: must be more than 0 and at most {100.0 * adaptation.max_depth_m:g} cm,"
-                " which is adaptation.max_depth_m in the configuration"
+                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
+                f" {100.0 * adaptation.max_depth_m:g} cm, which is adaptation.max_depth_m in the configuration"
             )
         adaptive = depth_m is None
         first_m = adaptation.initial_depth_m if adaptive else float(depth_m)

@@ -146,7 +146,7 @@ DEPTH = Parameter(
     Type.NUMBER,
     "fixed depth of every stride; without it, or with null, the depth adapts from adaptation.initial_depth_m on",
     "m",
-    bounds_note="more than 0, at most adaptation.max_depth_m",
+    bounds_note="at least 0.005, at most adaptation.max_depth_m",
     null_is_default=True,
 )
 FAILURE = (

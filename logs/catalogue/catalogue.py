@@ -38,7 +38,7 @@ from logs.files.log_error import LogError, Watch
 from logs.files.whole_files import hidden_path, whole_file
 
 NAME = "catalogue.parquet"
-VERSION = 1  # of COLUMNS; an older catalogue is made again
+VERSION = 2  # of COLUMNS; an older catalogue is made again
 VERSION_KEY = "mudskipper_catalogue"
 MOST_DIGITS = 9  # of a version; one with more is damage
 TRIALS_TABLE = "trials"

@@ -26,6 +26,13 @@ class LogEntry(NamedTuple):
     run: str = ""
     segment: int | None = None
     robot: str = ""
+    mud: str = ""  # this and the next six: the description of the trial
+    water: float | None = None  # %
+    trial: str = ""
+    operator: str = ""
+    tags: tuple[str, ...] = ()
+    note: str = ""
+    more: str = "{}"  # its other keys, as JSON
     started: datetime | None = None
     duration_s: float | None = None
     walks: int | None = None
@@ -80,10 +87,15 @@ def entry_of_row(row: tuple[Any, ...]) -> LogEntry:
     """Return the entry of a row of the table."""
     values = dict(zip(COLUMNS, row, strict=True))
     values["muds"] = tuple(MudEntry(**mud) for mud in values["muds"])
-    values["faults"] = tuple(values["faults"])
+    values |= {name: tuple(values[name]) for name in ("faults", "tags")}
     return LogEntry(**values)
 
 
 def row_of_entry(entry: LogEntry) -> tuple[Any, ...]:
-    values = entry._asdict() | {"muds": [mud._asdict() for mud in entry.muds], "faults": list(entry.faults)}
-    return tuple(values[name] for name in COLUMNS)
+    return tuple(values_of_entry(entry).values())
+
+
+def values_of_entry(entry: LogEntry) -> dict[str, Any]:
+    """Return the values by column, as SQL and JSON have them."""
+    lists = {"faults": list(entry.faults), "tags": list(entry.tags)}
+    return entry._asdict() | {"muds": [mud._asdict() for mud in entry.muds]} | lists

@@ -14,6 +14,7 @@ import numpy as np
 from control.modes import Mode
 from firmware_host.log.log_file import EXPORTED
 from firmware_host.log.rows import COEFFICIENTS
+from firmware_host.trial import KEYS, Trial, to_json
 from logs.catalogue.entry import FileStamp, LogEntry, MudEntry
 from logs.files.file_pass import ADVICE
 from logs.files.log_error import LogError
@@ -52,6 +53,7 @@ def entry_of_log(entry: LogEntry, log: Log) -> LogEntry:
         run=str(summary["run"]),
         segment=segment_of(log),
         robot=str(summary["robot"]),
+        **_description(summary["trial"]),
         started=_utc(str(summary["started"])),
         duration_s=float(summary["duration_s"]),
         walks=len(walks),
@@ -66,6 +68,17 @@ def entry_of_log(entry: LogEntry, log: Log) -> LogEntry:
         version=str(summary["version"]),
         commit=str(summary["commit"]),
     )
+
+
+def _description(trial: Trial) -> dict[str, Any]:
+    """Return the columns of a trial; `tags` become a list, and keys without a column JSON."""
+    columns = {key: trial.get(key, "") for key in ("mud", "trial", "operator", "note")}
+    water, tags = trial.get("water"), filter(None, trial.get("tags", "").split(","))
+    return columns | {
+        "water": float(water) if water else None,
+        "tags": tuple(tag.strip() for tag in tags),
+        "more": to_json({key: value for key, value in trial.items() if key not in KEYS}),
+    }
 
 
 def _utc(text: str) -> datetime | None:

@@ -22,7 +22,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from control.records import FLIPPERS
-from firmware_host.log.log_file import ATTACHMENT, METADATA
+from firmware_host.log.log_file import ANNOTATION, ATTACHMENT, METADATA
 from firmware_host.log.log_folder import present_path
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
@@ -110,6 +110,8 @@ class FilePass:
                 self.configuration_text = record.data.decode()
             case Metadata(name=name) if name == METADATA:
                 self.metadata = record.metadata
+            case Metadata(name=name) if name == ANNOTATION:
+                self.metadata = self.metadata | record.metadata
             case Statistics():
                 self.messages_counted = record.message_count
 

@@ -1,11 +1,14 @@
 """What `mudskipper log info` prints of a log, and when and in which segment of its run it begins."""
 
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from firmware_host.trial import BEGUN, METADATA_KEY, from_json, read_report
+from firmware_host.trial import BEGUN, METADATA_KEY, OperatorReport, Trial, from_json, read_report
 from logs.files.log_reader import AnyLog
 from logs.files.tick_array import Ticks
+
+MOST_DIGITS = 20  # of a time in nanoseconds
 
 
 def log_summary(log: AnyLog) -> dict[str, Any]:
@@ -17,7 +20,7 @@ def log_summary(log: AnyLog) -> dict[str, Any]:
         "robot": log.metadata.get("robot", ""),
         "run": log.metadata.get("run_id", ""),
         "segment": segment_of(log) if log.metadata.get("segment") else None,
-        "trial": from_json(log.metadata.get(METADATA_KEY, "")),
+        "trial": trial_of(log),
         "started": _start_time(log),
         "duration_s": round(duration_s, 3),
         "rate_hz": round((ticks - 1) / duration_s, 2) if duration_s > 0.0 else None,
@@ -49,10 +52,27 @@ def segment_of(log: AnyLog) -> int:
     return int(number) if number.isdecimal() else 0
 
 
+def trial_of(log: AnyLog) -> Trial:
+    """Return the description of the log's trial; empty where it has none."""
+    return from_json(log.metadata.get(METADATA_KEY, ""))
+
+
 def segments_before(log: AnyLog) -> int:
     """Return how many segments of the run may have rows of the log's first walk: none where it begins with a trial."""
     first = read_report(log.events[0]["text"]) if log.events else None
     return 0 if first and first.kind == BEGUN else segment_of(log)
+
+
+def operator_reports(events: Iterable[Any]) -> list[tuple[float, OperatorReport]]:
+    """Return the trials, notes and markers among the events, each after its time by the log's own clock."""
+    found = ((float(event["stamp_s"]), read_report(str(event["text"]))) for event in events)
+    return [(stamp_s, report) for stamp_s, report in found if report]
+
+
+def wall_offset_ns(metadata: Mapping[str, str]) -> int | None:
+    """Return the wall clock minus the log's own clock when the log began; None where the log does not know it."""
+    text = metadata.get("wall_minus_monotonic_ns", "")
+    return int(text) if text.isdecimal() and len(text) < MOST_DIGITS else None
 
 
 def begin_s(log: AnyLog) -> float:

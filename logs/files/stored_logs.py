@@ -40,14 +40,14 @@ def preserve(path: Path, undo: bool = False) -> Path:
     """Move a log to kept/, or back to done/. Raises OSError, and ValueError for a log that is elsewhere."""
     source, target = (PRESERVED, DONE) if undo else (DONE, PRESERVED)
     path = path.absolute()
+    if not path.exists():
+        raise FileNotFoundError(2, "No such file or directory", str(path))
     if path.parent.name == target:
         return path
     at_the_top = not undo and path.suffix == ENDING and (path.parent / DONE).is_dir()  # as older versions left it
     if path.parent.name != source and not at_the_top:
         raise ValueError(f"{path}: only a log in {source}/ can be moved to {target}/")
     moved = (path.parent if at_the_top else path.parent.parent) / target / path.name
-    if not path.exists():
-        raise FileNotFoundError(2, "No such file or directory", str(path))
     if moved.exists():
         raise ValueError(f"{moved} exists already")
     move_file(path, moved)
@@ -66,7 +66,7 @@ def why_not_read(path: Path, problem: OSError) -> str:
 def why_not_moved(path: Path, problem: OSError) -> str:
     if not isinstance(problem, PermissionError):
         return f"{path}: {problem.strerror or problem}"
-    return f"{path}: only the daemon's own user and root may move logs: do this as root"
+    return f"{path}: only the daemon's own user and root may change logs: do this as root"
 
 
 def size_text(size: float) -> str:

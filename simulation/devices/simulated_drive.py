@@ -24,6 +24,7 @@ from simulation.devices.late_messages import LateMessages
 
 TURN_RAD = 2.0 * pi
 SECOND_HARMONIC = 0.25
+SUPPLY_FRACTION = 0.1
 
 
 class SimulatedDrive(ABC):
@@ -98,6 +99,11 @@ class SimulatedDrive(ABC):
     @abstractmethod
     def _motor_nm(self, now_s: float) -> float:
         """Return the motor's torque now, by the drive's own torque constant, and trip where that is due."""
+
+    @property
+    def supply_a(self) -> float:
+        """Return the current of the supply, roughly: a bridge gives current at a fraction of the voltage."""
+        return SUPPLY_FRACTION * abs(self._current_a)
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
         """Set the joint's true angle and velocity."""

@@ -13,6 +13,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
+from firmware_host import daemon
 from tests.waiting import LONGEST_S
 
 
@@ -52,7 +53,8 @@ def _complaint(capsys: pytest.CaptureFixture[str], status: int, arguments: Seque
 
 
 def _status(arguments: Sequence[str]) -> int:
+    """Return the exit status of `mudskipper`, or of `mudskipperd` where that is the first argument."""
     try:
-        return main(arguments)
+        return daemon.main(arguments[1:]) if arguments[:1] == ("mudskipperd",) else main(arguments)
     except SystemExit as ended:  # as argparse does it
         return int(ended.code or 0)

@@ -21,7 +21,7 @@ from tests.command_line.command_lines import run
         ("fail --list all", exit_codes.USAGE, "--list takes neither"),
         ("log info /none.mcap", exit_codes.UNHEALTHY, "/none.mcap: No such file"),
         ("log query nonsense /none", exit_codes.UNHEALTHY, "/none: there is no such folder"),
-        ("replay /none.csv --config /none.toml", exit_codes.CONFIGURATION, "/none.toml: No such file"),
+        ("replay /none.csv --config /none.toml", exit_codes.UNHEALTHY, "/none.toml: No such file"),
         ("status --bogus", exit_codes.USAGE, "unrecognized arguments: --bogus"),
         ("experiment sweep", exit_codes.USAGE, "--simulated"),
     ],

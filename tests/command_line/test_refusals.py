@@ -16,7 +16,7 @@ from control.records import JOINTS
 from experiments.reports.text_tables import number
 from firmware_host import daemon
 from operator_client.status_client import DroppedError
-from tests.command_line.command_lines import failure, run
+from tests.command_line.command_lines import failure
 
 
 class Client:
@@ -73,65 +73,6 @@ def test_a_file_that_is_not_toml_is_refused_by_name_and_line(
     printed = capsys.readouterr()
     reported = " ".join((printed.out + printed.err).split())
     assert "robot.toml: not a TOML file: " in reported and "line 2, column 11" in reported
-
-
-EXPERIMENT = "experiment {} --out none"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        ("", ""),
-        ("dance", "dance"),
-        ("log", "'mudskipper log --help'"),
-        ("stop --jsn", "--jsn"),
-        ("arm --f", "--f"),  # would overrule failed checks
-        ("status --js", "--js"),
-        ("walk --depth 3 --adaptive", "--adaptive"),
-        ("walk --strides 0", "--strides"),  # would walk without end
-        ("simulate --world world.toml --mud 48.5", "--mud"),
-        ("move left_sweep=5 left_sweep=10", "left_sweep"),
-        *((f"move {text}", text) for text in ("tail=10", "left_sweep", "left_sweep=", "left_sweep=far", "=3")),
-        ("move left_sweep=nan", "left_sweep=nan"),
-        ("log list --config /none/robot.toml", "name the folder"),
-        ("log index --config /none/robot.toml", "name the folder"),
-        ("log recover --config /none/robot.toml", "name the folder"),
-        ("log report x.mcap --mud pond=1", "--mud"),
-        ("log report x.mcap --mud =40", "--mud"),
-        ("log report x.mcap --mud a --world b.toml", "--mud"),
-        ("plot x.mcap --out x.gif", ".png"),
-        ("film x.mcap --out x.mp4", ".png"),
-        ("film x.mcap --out x", ".png"),
-        *((f"init - {wrong}", wrong.split("=")[1]) for wrong in ("--set=length=1", "--node=tail=1")),
-        *((f"init - {wrong}", wrong.split("=")[-1]) for wrong in ("--set=drop_m=deep", "--set=drop_m=nan")),
-        ("init - --node=left_sweep", "left_sweep"),
-        ("demo --depth nan", "nan"),
-        ("demo --depth -1", "-1"),
-        ("experiment walk --mu 47.6", "--mu"),
-        (EXPERIMENT.format("actuator --lever 12cm"), "12cm"),
-        (EXPERIMENT.format("loadcell --scale many"), "many"),
-        (EXPERIMENT.format("loadcell --plate 3x"), "3x"),
-        (EXPERIMENT.format("flipper --depth deep"), "deep"),
-        *((EXPERIMENT.format(f"walk --mud {mud}"), mud) for mud in ("=30", "47.6=long", "47.6=3")),
-        (f"experiment walk --out {__file__}", "folder"),
-        (EXPERIMENT.format("flipper"), "--mud 47.6"),
-        (EXPERIMENT.format("walk"), "--mud 47.6=61"),
-        (EXPERIMENT.format("flipper --simulated --mud clay"), "clay"),
-        (EXPERIMENT.format("flipper --simulated --mud 70"), "70 %"),
-        (EXPERIMENT.format("walk --simulated --soft clay"), "clay"),
-        (EXPERIMENT.format("walk --mud 47.6 --mud 47.6=30"), "--mud"),
-    ],
-)
-def test_a_wrong_command_line_is_refused_before_anything_begins(
-    arguments: str, named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("command_line.demo.demo._end_on_signals", lambda: None)
-    monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
-    ended = run(*arguments.split())
-    assert (ended.returncode, ended.stdout) == (exit_codes.USAGE, "")
-    assert named in ended.stderr and "Traceback" not in ended.stderr
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_status_names_drives_that_were_not_heard_yet() -> None:

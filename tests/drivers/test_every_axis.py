@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 import pytest
 
 from tests.drivers.bench.simulated_bus import simulated
@@ -36,3 +38,29 @@ def test_a_torque_of_another_program_is_counted_for_its_drive(name: str) -> None
     drives.far.send(drives.devices[0].forge_torque(0.1))
     drives.tick()
     assert [axis.health.foreign_commands for axis in drives.drives.axes] == [1, 0, 0, 0]
+
+
+SUPPLIED_A = 0.1 * 0.1 / 0.083  # as the simulated drives take for 0.1 N·m
+SUPPLIES = {  # voltage and current that each type reports
+    "odrive": (23.0, SUPPLIED_A),
+    "odrive05": (23.0, SUPPLIED_A),
+    "moteus": (23.0, SUPPLIED_A),
+    "mit": (23.0, None),
+    "mit:AK80-9": (None, None),
+}
+
+
+@each_type
+@pytest.mark.parametrize("slow_period_s", [0.1, 10.0], ids=["reported", "only when asked"])
+def test_the_supply_of_every_drive_is_known_also_of_one_that_reports_it_only_when_asked(
+    name: str, slow_period_s: float
+) -> None:
+    drives = DrivenDrives(name, {"bus_voltage_v": 23.0, "slow_period_s": slow_period_s})
+    drives.arm()
+    drives.tick(0.1, count=200)
+    for axis in drives.drives.axes:
+        assert axis.state.closed_loop
+        seen = (axis.state.bus_voltage_v, axis.state.bus_current_a)
+        for value, expected in zip(seen, SUPPLIES[name], strict=True):
+            assert isnan(value) if expected is None else value == pytest.approx(expected, rel=0.02)
+    assert drives.drives.malformed_frames == 0

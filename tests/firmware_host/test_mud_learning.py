@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 from typing import Any
 
@@ -15,6 +15,12 @@ from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, Estimate, FlipperLoad, GaitTarget, Phase, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.mud_learning import FIRM_TICKS, LARGEST_N_M3, STORED_STRIDES, MudLearning
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import paper_track
 
 GOOD = Estimate(2e6, 1e5, 100, True)
 
@@ -200,3 +206,26 @@ def test_wild_coefficients_never_lead_to_a_depth_out_of_bounds(
         step(learning, controller, *strides)
         bounds = configuration.adaptation
         assert bounds.min_depth_m <= controller.gait.next_depth_m <= bounds.max_depth_m
+
+
+def test_a_stride_has_the_lowest_voltage_of_its_own_drives(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, paper_track(), seed=5)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 2))
+    drive = robot.robot.drives[0]
+    assert robot.run_until(lambda: robot.loop.target.phase is Phase.STANCE, 5.0)
+    drive.parameters = replace(drive.parameters, bus_voltage_v=21.5)
+    robot.run_for(0.2)
+    drive.parameters = replace(drive.parameters, bus_voltage_v=24.0)
+    calls = OperatorCalls(robot.loop, [], lambda: robot.now_s).methods
+    lowest_v = []
+    for number in (2, 4):
+        assert robot.run_until(lambda: robot.loop.learning.strides_closed == number, 10.0)  # noqa: B023
+        lowest_v.append(calls["status"]({}, Caller(1, Peer(1, 0, frozenset()), Level.DRIVE))["stride_supply_min_v"])
+    assert [(each.estimate.flipper, each.supply_min_v) for each in robot.loop.learning.strides] == [
+        ("left", 21.5),
+        ("right", 24.0),
+        ("left", 24.0),
+        ("right", 24.0),
+    ]
+    assert lowest_v == [21.5, 24.0]

@@ -51,7 +51,18 @@ def test_every_value_of_the_log_is_in_a_table(log: Log, tmp_path: Path) -> None:
     assert strides["k_s"].to_pylist() == [row["k_s"] for row in log.strides]
     assert events["text"].to_pylist() == [row["text"] for row in log.events]
     cells = [field.length or 1 for field in TICK.fields]
-    assert (ticks.num_columns, strides.num_columns, events.num_columns) == (sum(cells), len(STRIDE.fields), 2)
+    assert (ticks.num_columns, strides.num_columns, events.num_columns) == (sum(cells) + 1, len(STRIDE.fields) + 1, 3)
+
+
+def test_every_row_has_universal_time(log: Log, tmp_path: Path) -> None:
+    offset_ns = int(log.metadata["wall_minus_monotonic_ns"])
+    for path in write_parquet(log, tmp_path, "walk"):
+        table = pq.read_table(path)
+        assert str(table.schema.field("time").type) == "timestamp[ns, tz=UTC]"
+        times_ns = table["time"].cast("int64").to_numpy()
+        assert times_ns.tolist() == [offset_ns + round(stamp_s * 1e9) for stamp_s in table["stamp_s"].to_pylist()]
+    unknown = log._replace(metadata={"wall_minus_monotonic_ns": "-1e9"})
+    assert "time" not in pq.read_schema(write_parquet(unknown, tmp_path, "walk")[0]).names
 
 
 def test_columns_say_their_units_and_the_file_its_origin(log: Log, tmp_path: Path) -> None:

@@ -30,9 +30,12 @@ def test_strides_and_events_become_tables(log: mudskipper.OpenedLog) -> None:
     assert log.events.to_pandas()["text"].str.startswith("request walk").sum() == 1
 
 
-def test_selected_rows_become_a_table_too(log: mudskipper.OpenedLog) -> None:
+def test_selected_rows_become_a_table_too_with_their_time(log: mudskipper.OpenedLog) -> None:
     walking = log.ticks[log.ticks["stride"] >= 0]
-    assert len(walking.to_pandas()) == len(walking) < len(log.ticks)
+    frame = walking.to_pandas()
+    assert len(frame) == len(walking) < len(log.ticks)
+    assert frame.index[0] == log.ticks.to_pandas().index[int(np.argmax(log.ticks["stride"] >= 0))]
+    assert str(frame.index[0])[:19] == "2026-11-22 14:50:22" and str(frame.index.tz) == "UTC"
 
 
 def test_a_column_is_a_plain_array(log: mudskipper.OpenedLog) -> None:

@@ -72,7 +72,6 @@ NO_CLAMP = Difference(
 )
 LEFT_AT_ONCE = _instead("an answer states that it was in the mode, and has left it", "drive_disarmed")
 HELD_FAST = "a joint that is held fast reports the same codes in every answer, as an encoder does that has failed"
-NO_VOLTAGE = "no answer states the supply's voltage; below a limit of its own the drive reports an error"
 MIT: Table = {
     "position_stale": _instead(ONE_ANSWER, "drive_quiet"),
     "position_silent": _instead(ONE_ANSWER, "drive_silent"),
@@ -84,9 +83,6 @@ MIT: Table = {
         *("drive_energised", "torque_missing", "damping_failed"),
     ),
     "encoder_stuck, at zero speed": NO_CLAMP,
-    "voltage_silent": _waived(NO_VOLTAGE),
-    "voltage_low": _waived(NO_VOLTAGE),
-    "voltage_under": _waived(NO_VOLTAGE),
     "drive_error, by its watchdog": Difference(
         "a drive without commands sends no answer that could state the error",
         {"instead": ("drive_silent",), "component": "JOINT.command", "kind": "off", "act": ()},
@@ -105,6 +101,7 @@ MIT: Table = {
     "following_error": _instead(HELD_FAST, "encoder_stuck"),
 }
 NO_REGISTERS = "MIT mode reads no register of this motor, so it is armed by force"
+NO_VOLTAGE = "no answer states the supply's voltage; below a limit of its own the drive reports an error"
 NO_STATUS = "no answer states whether the drive is in the mode"
 WITHOUT_REGISTERS: Table = {  # CubeMars
     "drive_version": Difference(NO_REGISTERS),
@@ -114,6 +111,9 @@ WITHOUT_REGISTERS: Table = {  # CubeMars
     "watchdog_off": Difference(NO_REGISTERS),
     "drive_disarmed": _waived(NO_STATUS),
     "arming_failed": _waived(NO_STATUS),
+    "voltage_silent": _waived(NO_VOLTAGE),
+    "voltage_low": _waived(NO_VOLTAGE),
+    "voltage_under": _waived(NO_VOLTAGE),
 }
 FOREIGN_TORQUES = ("foreign_commands", "setpoint_mismatch", "foreign_torque")
 RESTARTED = Difference(

@@ -18,7 +18,7 @@ from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit import codec
 from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
-from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
+from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, SUPPLY_V, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.mit.commands import AT_REST, decode_command
 from simulation.devices.mit.registers import answer_register, encode_value, first_values, write_frame
@@ -80,6 +80,7 @@ class SimulatedMit(SimulatedDrive):
         if frame.arbitration_id == codec.REGISTER_ID and self._model.has_registers:
             if frame.data[:3] == codec.encode_read(parameters.node_id, 0)[:2] + bytes([codec.STATE]):
                 return self._state()
+            self.registers[SUPPLY_V] = parameters.bus_voltage_v
             return answer_register(self.registers, self.stored, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""

@@ -29,7 +29,7 @@ from simulation.devices.simulated_drive import SimulatedDrive
 
 FIRMWARE = 0x010100  # 1.1.0
 SERIAL_WORDS = range(Register.SERIAL_NUMBER, Register.SERIAL_NUMBER + 3)
-UNUSED_REGISTERS = (0x006, 0x007, 0x00B, 0x00C)  # absolute position, power, trajectory, homing: always 0 here
+UNUSED_REGISTERS = (0x006, 0x00B, 0x00C)  # absolute position, trajectory, homing: always 0 here
 REGISTERS = frozenset({*Register, *SERIAL_WORDS, *UNUSED_REGISTERS})
 RUNNING = (Mode.STOPPED, Mode.CURRENT, Mode.POSITION, Mode.ZERO_VELOCITY, Mode.BRAKE)  # in which it obeys every command
 DAMPING = (Mode.ZERO_VELOCITY, Mode.BRAKE)
@@ -159,6 +159,8 @@ class SimulatedMoteus(SimulatedDrive):
                 return parameters.temperature_c
             case Register.VOLTAGE:
                 return parameters.bus_voltage_v
+            case Register.POWER:
+                return parameters.bus_voltage_v * self.supply_a
             case Register.FAULT:
                 return float(self.fault)
             case Register.CONTROL_TORQUE:

@@ -244,7 +244,7 @@ class SimulatedOdrive(SimulatedDrive):
         return codec.GET_ERROR.encode(self.errors, self.disarm_reason)
 
     def _bus_voltage(self) -> bytes:
-        return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
+        return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, self.supply_a)
 
     def _temperature(self) -> bytes:
         return codec.GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)

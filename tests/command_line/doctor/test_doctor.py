@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from command_line.doctor.doctor import examine_all, examine_daemon
 from command_line.doctor.findings import Level
 from command_line.main import main
 from control.records import JOINTS
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.running_bench import Bench
@@ -53,14 +55,18 @@ def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("watchdog_s", "level"), [(0.3, Level.OK), (None, Level.WARN), (0.0, Level.FAIL), (0.5, Level.FAIL)]
 )
-def test_a_drive_without_a_watchdog_that_is_quick_enough_fails(watchdog_s: float | None, level: Level) -> None:
+def test_a_drive_without_a_watchdog_that_is_quick_enough_fails(
+    watchdog_s: float | None, level: Level, configuration: Configuration
+) -> None:
     drives = [{"joint": "left_sweep", "watchdog_s": watchdog_s}]
-    found = {finding.id: finding.level for finding in examine_daemon(synthetic_status(drives=drives), "1.0", 0.3)}
-    assert found == {"daemon": Level.OK, "watchdog.left_sweep": level}
+    bounds = replace(configuration.faults, longest_watchdog_s=0.3)
+    found = list(examine_daemon(synthetic_status(drives=drives), "1.0", replace(configuration, faults=bounds)))
+    assert {finding.id: finding.level for finding in found} == {"daemon": Level.OK, "watchdog.left_sweep": level}
+    assert found[1].fix in ("", f"docs/how-to/{configuration.drive['left_sweep'].type}.md")
 
 
-def test_a_daemon_of_another_version_is_warned_of() -> None:
-    found = next(iter(examine_daemon(synthetic_status(), "1.1", 0.3)))
+def test_a_daemon_of_another_version_is_warned_of(configuration: Configuration) -> None:
+    found = next(iter(examine_daemon(synthetic_status(), "1.1", configuration)))
     assert found.level is Level.WARN
     assert "1.0" in found.text and "1.1" in found.text
 
@@ -72,5 +78,6 @@ def test_a_running_daemon_reports_its_process_its_drives_and_its_limits(bench: B
     assert {f"watchdog.{joint}" for joint in JOINTS} <= set(found)
     assert "unfinished_logs" not in found
     assert found["loop.priority"].text.startswith("the running loop has real-time priority ")
-    assert "of the daemon" in found["realtime"].text
+    assert "of the daemon" in found["memlock"].text
+    assert "realtime" not in found  # the loop has its priority, whatever a limit would permit
     assert found["socket"].level is Level.OK

@@ -122,16 +122,9 @@ def test_a_file_of_another_drive_is_not_restored(folder: Path, monkeypatch: pyte
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        ("setup tail", "left_sweep"),
-        ("setup --restore none.toml", "none.toml"),
-        ("setup --endpoints none.json", "none.json"),
         ("setup --endpoints bad.json", "no JSON"),
         ("setup --endpoints other.json", "no flat_endpoints.json"),
         ("setup --restore other.json", "other.json"),
-        ("zero tail", "left_sweep"),
-        ("find --bus middle", "left, right"),
-        ("find --interface socketcan", "--channel"),
-        ("find --config /none.toml", "/none.toml"),
     ],
 )
 def test_a_wrong_argument_is_refused_before_anything_is_written(

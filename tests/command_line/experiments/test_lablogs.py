@@ -11,7 +11,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from tests.command_line.command_lines import refusal
+from tests.command_line.command_lines import failure, refusal
 from tests.folders import SHARED_DATA
 
 LABLOGS = ("experiment", "lablogs")
@@ -31,7 +31,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert "no such folder" in refusal(capsys, *LABLOGS, str(tmp_path / "missing"))
+    assert "no such folder" in failure(capsys, *LABLOGS, str(tmp_path / "missing"))
     assert "holds no log" in refusal(capsys, *LABLOGS, str(tmp_path))
     (tmp_path / "pond.csv").write_text("no log")
     assert "must be a pattern and a name" in refusal(capsys, *LABLOGS, str(tmp_path), "--group", "pond*")

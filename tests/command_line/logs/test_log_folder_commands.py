@@ -112,7 +112,7 @@ def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
     assert f"have root add you to the group of {log}, then log in again, or do this as root" in capsys.readouterr().err
     assert main.main(["log", "preserve", log]) == exit_codes.UNHEALTHY
     assert capsys.readouterr().err.endswith(
-        "1.mcap: only the daemon's own user and root may move logs: do this as root\n"
+        "1.mcap: only the daemon's own user and root may change logs: do this as root\n"
     )
 
 
@@ -122,4 +122,4 @@ def test_the_configured_folder_is_the_default(folder: Path, capsys: pytest.Captu
     configuration.write_text(text.replace("/var/lib/mudskipper/logs", str(folder)), encoding="utf-8")
     assert main.main(["log", "list", "--config", str(configuration)]) == exit_codes.OK
     assert "1.mcap" in capsys.readouterr().out
-    assert main.main(["log", "recover", "--config", str(folder / "none.toml")]) == exit_codes.CONFIGURATION
+    assert main.main(["log", "recover", "--config", str(folder / "none.toml")]) == exit_codes.UNHEALTHY

@@ -32,7 +32,8 @@ def test_the_first_rule_that_matches_replaces_the_label() -> None:
         "firm",
         "other",
     ]
-    assert group_of("pond.csv.gz", (GroupRule("pond", "wet"),)) == "wet"  # without the ending
+    assert group_of("pond.csv.gz", (GroupRule("pond", "wet"),), "A") == "wet"  # without the ending
+    assert group_of("single_12.5N_1.csv", (), "A") == "A"  # which the log names
 
 
 def test_groups_are_in_the_order_of_strength() -> None:
@@ -40,11 +41,29 @@ def test_groups_are_in_the_order_of_strength() -> None:
     assert sorted(groups, key=group_key) == ["12.5N", "12N", "10.3N", "walk 30N", "walk 15.6N", "pond"]
 
 
-def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_are_one(tmp_path: Path) -> None:
-    for name in ("a/one.csv", "a/b/two.csv.gz", "a/run-0000.mcap", "a/run-0001.mcap", "a/bench-0001.mcap", "a/c.txt"):
+def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_one(tmp_path: Path) -> None:
+    trials = ("a/run-0002_A_1.mcap", "a/run-0003_A_1.mcap", "a/run-0004_A_2.mcap", "a/run-0005.mcap")
+    logs = (
+        "a/one.csv",
+        "a/b/two.csv.gz",
+        "a/run-0000.mcap",
+        "a/run-0001.mcap",
+        *trials,
+        "a/bench-0001.mcap",
+        "a/c.txt",
+    )
+    for name in logs:
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     found = find_logs([tmp_path, tmp_path / "a" / "b", tmp_path / "a" / "one.csv"])
     names = [[path.name for path in paths] for paths in found]
-    assert sorted(names) == [["bench-0001.mcap"], ["one.csv"], ["run-0000.mcap", "run-0001.mcap"], ["two.csv.gz"]]
+    assert sorted(names) == [
+        ["bench-0001.mcap"],
+        ["one.csv"],
+        ["run-0000.mcap", "run-0001.mcap"],
+        ["run-0002_A_1.mcap", "run-0003_A_1.mcap"],
+        ["run-0004_A_2.mcap"],
+        ["run-0005.mcap"],
+        ["two.csv.gz"],
+    ]

@@ -69,7 +69,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         "drive.left_sweep.current_limit_a = 5.0: must be at least 9.04 for limits.torque_nm = 0.75"
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "vesc"', [
-        "drive.left_sweep.type = 'vesc': must be one of odrive, moteus, mit"
+        "drive.left_sweep.type = 'vesc': there is no such type; there are odrive, moteus, mit"
     ]),
     *(
         ("[drive.left_sweep]", f'[drive.left_sweep]\nserial_number = "{number}"', [
@@ -78,7 +78,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         for number in ("385F324D3037", "0x385f324d3037", "385f324d303")
     ),
     ("[drive.left_sweep]", "[drive.left_sweep]\ntype = 7", [
-        "drive.left_sweep.type = 7: must be one of odrive, moteus, mit"
+        "drive.left_sweep.type = 7: there is no such type; there are odrive, moteus, mit"
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', ["drive.left_sweep.node_id = 0: must be at least 1"]),
     ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
@@ -127,7 +127,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("[drive.right_sweep]", "[drive.right_swep]", [
         "drive.right_sweep is missing: ", "drive.right_swep: there is no such joint"
     ]),
-    ('"walking"', '"galloping"', ["gait.protocol = 'galloping': must be one of walking, measuring, single_flipper"]),
+    ('"walking"', '"galloping"', ["gait.protocol = 'galloping': there is no such protocol; did you mean walking?"]),
     ('name = "mudskipper"', 'name = "../../x"', ["robot.name = '../../x': must be 1 to 64"]),
     ('name = "mudskipper"', 'name = ""', ["robot.name = '': must be 1 to 64"]),
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
@@ -162,7 +162,7 @@ def test_a_value_that_contradicts_another_is_refused(example_text: str, key: str
 
 def test_drives_share_neither_a_missing_bus_nor_an_id() -> None:
     missing = problems_of(minimal_text().replace("[bus.a]", "[bus.b]"))
-    assert "drive.left_sweep.bus = 'a': no such bus; there is b" in missing
+    assert "drive.left_sweep.bus = 'a': there is no such bus; there is b" in missing
     twice = problems_of(minimal_text().replace("node_id = 3", "node_id = 2"))
     assert twice == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a'"]
 

@@ -30,6 +30,8 @@ def test_a_tick() -> None:
             current_a=number + 0.75,
             current_stamp_s=20.0 - number,
             temperature_c=number,
+            bus_voltage_v=number + 20.0,
+            bus_current_a=number + 0.125,
         )
         for number in (1.0, 2.0)
     ]
@@ -74,6 +76,8 @@ def test_a_tick() -> None:
         "stride_depth_m": 15.0,
         "body_x_m": 16.0,
         "temperature_c": (1.0, 2.0),
+        "bus_voltage_v": (21.0, 22.0),
+        "bus_current_a": (1.125, 2.125),
         "tick": 7,
         "missed_ticks": 17,
         "stride": 3,
@@ -113,10 +117,11 @@ def test_a_stride() -> None:
         tare_drift_n=19.0,
         extraction_torque_nm=20.0,
     )
-    values = STRIDE.decode(stride_row(21.0, stride, 22.0))
-    assert {name: values.pop(name) for name in ("stamp_s", "chosen_depth_m", "flipper")} == {
+    values = STRIDE.decode(stride_row(21.0, stride, 22.0, 23.0))
+    assert {name: values.pop(name) for name in ("stamp_s", "chosen_depth_m", "supply_min_v", "flipper")} == {
         "stamp_s": 21.0,
         "chosen_depth_m": 22.0,
+        "supply_min_v": 23.0,
         "flipper": 1,
     }
     for name, estimate in zip(("k_p", "k_s", "k_e"), estimates, strict=True):

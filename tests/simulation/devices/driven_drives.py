@@ -59,6 +59,7 @@ class DrivenDrives:
             if torque_nm is None:
                 self.drives.request_settings(self.now_s)
             self.drives.send((torque_nm or 0.0,) * 4, 0.1)  # type: ignore[arg-type]
+            self.drives.request_supply()
             self.exchange()
         self.drives.read(self.now_s + TICK_S / 2.0)
 

@@ -1,0 +1,188 @@
+"""Wrong inputs of every command: no traceback, one exit status for one kind of mistake, a text that names the thing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from simulation.harness.local_setup import configuration_text
+from tests.command_line.command_lines import run
+
+EXPERIMENT = "experiment {} --out none"
+WRONG_COMMAND_LINES = [  # and what the message names
+    ("", ""),
+    ("dance", "dance"),
+    ("wlak", "did you mean walk?"),
+    ("--socket X status", "'mudskipper COMMAND --socket ...'"),
+    ("log --json list", "'mudskipper log ACTION --json ...'"),
+    ("log", "'mudskipper log --help'"),
+    ("log lits", "did you mean list?"),
+    ("stop --jsn", "--jsn"),
+    ("arm --f", "--f"),  # would overrule failed checks
+    ("status --js", "--js"),
+    ("walk --depht 3", "did you mean --depth?"),
+    ("walk --depth 3 --adaptive", "--adaptive"),
+    ("walk --strides 0", "--strides"),  # would walk without end
+    ("walk --strides 2.5", "2.5: must be a whole number"),
+    ("walk --depth 2.0mm", "2.0mm: must be a number in cm"),
+    ("walk --depth deep", "deep: must be a number in cm"),
+    ("walk --depth 0.001", "from 0.5 to 20 cm"),
+    ("walk --depth 0.02", "from 0.5 to 20 cm"),  # m
+    ("simulate --world world.toml --mud 48.5", "--mud"),
+    ("simulate --mud 48", "48.5"),
+    ("simulate --bus a/b", "a/b"),
+    ("move left_sweep=5 left_sweep=10", "left_sweep"),
+    *((f"move {text}", text) for text in ("tail=10", "left_sweep", "left_sweep=", "left_sweep=far", "=3")),
+    ("move left_swep=10", "did you mean left_sweep?"),
+    ("move left_sweep=nan", "left_sweep=nan"),
+    ("fail left_sweep", "KIND"),
+    ("fail --list all", "--list"),
+    ("fail all ok --for long", "long: must be a number in s"),
+    ("live --port 70000", "70000"),
+    ("live --host 300.1.1.1", "--host 300.1.1.1"),
+    ("live --page --host 192.0.2.1", "--host 192.0.2.1"),
+    ("log list --config /none/robot.toml", "name the folder"),
+    ("log index --config /none/robot.toml", "name the folder"),
+    ("log recover --config /none/robot.toml", "name the folder"),
+    ("log report x.mcap --mud pond=1", "--mud"),
+    ("log report x.mcap --mud =40", "--mud"),
+    ("log report x.mcap --mud a --world b.toml", "--mud"),
+    ("log report x.mcap --out text.mcap", "must be a folder"),
+    ("log export x.mcap", "--parquet"),
+    ("log open x.mcap --with vlc", "vlc"),
+    ("replay x.mcap --method papre", "did you mean paper?"),
+    ("replay x.mcap --vertical z", "not a CSV log"),
+    ("plot x.mcap --out x.gif", ".png"),
+    ("film x.mcap --out x.mp4", ".png"),
+    ("film x.mcap --out x", ".png"),
+    *((f"init - {wrong}", wrong.split("=")[1]) for wrong in ("--set=length=1", "--node=tail=1")),
+    *((f"init - {wrong}", wrong.split("=")[-1]) for wrong in ("--set=drop_m=deep", "--set=drop_m=nan")),
+    ("init - --node=left_sweep", "left_sweep"),
+    ("init - --defaults --flippers left --node=right_sweep=2", "no such joint"),
+    ("init - --interface sockercan", "did you mean socketcan?"),
+    ("init - --drive odriv", "did you mean odrive?"),
+    ("init - --defaults --channel a --channel b --channel c", "3 channels"),
+    ("init robot.toml --defaults", "robot.toml exists"),
+    ("drives find --interface sockercan --channel can0", "did you mean socketcan?"),
+    ("drives find --interface socketcan", "--channel"),
+    ("drives find --config robot.toml --bus lefd", "did you mean left?"),
+    ("drives zero left_swep --config robot.toml", "did you mean left_sweep?"),
+    ("drives setup left_swep --config robot.toml", "did you mean left_sweep?"),
+    ("drives find --type servo", "servo"),
+    ("demo --depth nan", "nan"),
+    ("demo --depth -1", "-1"),
+    ("demo --seed x", "x"),
+    ("experiment walk --mu 47.6", "--mu"),
+    ("experiment wlak", "did you mean walk?"),
+    (EXPERIMENT.format("actuator --lever 12mm"), "12mm"),
+    (EXPERIMENT.format("loadcell --scale many"), "many"),
+    (EXPERIMENT.format("loadcell --plate 3x"), "3x"),
+    (EXPERIMENT.format("flipper --depth deep"), "deep"),
+    *((EXPERIMENT.format(f"walk --mud {mud}"), mud) for mud in ("=30", "47.6=long", "47.6=3")),
+    ("experiment walk --out text.mcap", "folder"),
+    (EXPERIMENT.format("flipper"), "--mud 47.6"),
+    (EXPERIMENT.format("walk"), "--mud 47.6=61"),
+    (EXPERIMENT.format("flipper --simulated --mud clay"), "clay"),
+    (EXPERIMENT.format("flipper --simulated --mud 70"), "70 %"),
+    (EXPERIMENT.format("walk --simulated --soft clay"), "clay"),
+    (EXPERIMENT.format("walk --mud 47.6 --mud 47.6=30"), "--mud"),
+]
+MISSING_INPUTS = [
+    "log info /none/x.mcap",
+    "log report /none/x.mcap",
+    "log report text.mcap --world /none/x.toml",
+    "log export --csv /none/x.mcap",
+    "log preserve /none/x.mcap",
+    "log preserve x.mcap --undo",
+    "log index /none/logs",
+    "log list /none/logs",
+    "log query select /none/logs",
+    "log recover /none/x.mcap",
+    "log open /none/x.mcap --with rerun",
+    "replay /none/x.mcap",
+    "replay text.mcap --config /none/x.toml",
+    "plot /none/x.mcap",
+    "film /none/x.mcap",
+    "simulate --config /none/x.toml",
+    "simulate --world /none/x.toml",
+    "demo --world /none/x.toml",
+    "init - --plate /none/x.csv",
+    "drives find --config /none/x.toml",
+    "drives zero left_sweep --config /none/x.toml",
+    "drives setup --config /none/x.toml",
+    "drives setup --config robot.toml --restore /none/x.json",
+    "drives setup --config robot.toml --endpoints /none/x.json",
+    "experiment actuator --simulated --config /none/x.toml",
+    "experiment lablogs /none/x.csv",
+    "experiment flipper --simulated --mud 47.6 --out out --truth /none/x.json",
+    "experiment campaign /none/x.toml",
+    "doctor --config /none/x.toml",
+    "check --config /none/x.toml",
+]
+UNREADABLE = [  # and what the message names
+    ("log info text.mcap", "text.mcap"),
+    ("log report text.mcap", "text.mcap"),
+    ("replay text.mcap", "text.mcap"),
+    ("plot .", "."),
+    ("log open text.mcap --with rerun", "text.mcap"),
+    ("log recover text.mcap", "text.mcap"),
+    ("log query nonsense .", "nonsense"),
+    ("drives find --interface kvaser --channel 0", "kvaser 0"),
+    ("drives find --interface slcan --channel /none", "slcan /none"),
+]
+READ_CONFIGURATION = ("simulate", "drives find", "replay text.mcap", "mudskipperd --check-config")
+WRONG_CONFIGURATIONS = [
+    (f"{command} --config {file}", named)
+    for command in READ_CONFIGURATION
+    for file, named in (
+        ("keys.toml", "drive.left_sweep.nod_id: there is no such key; did you mean node_id?"),
+        ("keys.toml", "robbot: there is no such key; did you mean robot?"),
+        ("interface.toml", "'sockercan': python-can has no such interface; did you mean socketcan?"),
+        ("type.toml", "drive.left_sweep.type = 'odriv': there is no such type; did you mean odrive?"),
+    )
+]
+NEEDS_DAEMON = ("status", "arm", "walk --depth 2.0cm", "move left_sweep=10", "stop", "disarm", "clear", "fail --list")
+CASES = [
+    *((exit_codes.USAGE, *case) for case in WRONG_COMMAND_LINES),
+    *(
+        (exit_codes.UNHEALTHY, line, next(word for word in line.split() if word.startswith(("/none", "x."))))
+        for line in MISSING_INPUTS
+    ),
+    *((exit_codes.UNHEALTHY, *case) for case in UNREADABLE),
+    *((exit_codes.CONFIGURATION, *case) for case in WRONG_CONFIGURATIONS),
+    *((exit_codes.NO_DAEMON, line, "no daemon answers on /none.sock") for line in NEEDS_DAEMON),
+    (exit_codes.REFUSED, "log preserve text.mcap", "only a log in done/"),
+]
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with files that are wrong, and one configuration that is not."""
+    folder = tmp_path_factory.mktemp("inputs")
+    text = configuration_text(folder, folder)
+    wrong = {
+        "keys.toml": text.replace("node_id = 0", "nod_id = 0") + '[robbot]\nname = "x"\n',
+        "interface.toml": text.replace('"mudskipper_local"', '"sockercan"'),
+        "type.toml": text.replace("node_id = 0", 'node_id = 0\ntype = "odriv"'),
+    }
+    for name, content in {"robot.toml": text, "text.mcap": "no log\n", **wrong}.items():
+        (folder / name).write_text(content, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(("status", "line", "named"), CASES, ids=[line or "nothing" for _, line, _ in CASES])
+def test_a_wrong_input_is_refused_with_its_status_and_its_name(
+    status: int, line: str, named: str, inputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(inputs)
+    monkeypatch.setattr("command_line.demo.demo._end_on_signals", lambda: None)
+    monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
+    before = set(inputs.iterdir())
+    ended = run(*line.split(), MUDSKIPPER_SOCKET="/none.sock")
+    said = ended.stdout + ended.stderr
+    assert ended.returncode == status, said
+    assert named in " ".join(said.split()) and "Traceback" not in said
+    if status == exit_codes.USAGE:
+        assert (ended.stdout == "" or "--json" in line) and set(inputs.iterdir()) == before
