@@ -77,7 +77,7 @@ def _append(path: Path, file: BinaryIO, summary: Summary, record: Metadata) -> N
     Footer(start, 0, zlib.crc32(footer, zlib.crc32(index))).write(tail)
     tail.write(MCAP0_MAGIC)
     file.seek(end)
-    file.write(tail.end())
+    file.write(tail.end())  # type: ignore[no-untyped-call]
     file.flush()
     os.fsync(file.fileno())
 
@@ -95,4 +95,4 @@ def _index_of(summary: Summary) -> bytes:
         *summary.metadata_indexes,
     ):
         record.write(index)
-    return index.end()
+    return bytes(index.end())  # type: ignore[no-untyped-call]

@@ -21,6 +21,7 @@ from typing import Any
 
 from command_line.live.own_page import own_page
 from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion
+from command_line.watch.orders import send_order
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
@@ -28,12 +29,14 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.operator.reports import known
+from firmware_host.sockets.rpc import LONGEST_REQUEST
 from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PAGE = Path(__file__).with_name("page.html")
 INTERVAL_S = 0.1  # between two ticks
 KEPT = {"ticks": 200, "strides": 60, "events": 200}  # that a new page gets: ticks of 20 s
+LONGEST_TEXT = 1 << 20  # bytes that are read of a note
 STOP_HEADER = "X-Mudskipper"
 ANSWER_S = 2.0  # of the daemon, whether it would take a stop
 ROWS = re.compile(r"/rows\?after=(-?\d{1,18})")
@@ -126,7 +129,8 @@ class PageServer:
                 newest = row
             else:
                 kept = self._strides if row.kind.topic == STRIDE.topic else self._events
-                kept.append(finite(row.values))
+                wall_s = row.stamp_s + time.time() - time.monotonic()  # this program runs on the robot's computer
+                kept.append(finite(row.values | {"wall_s": wall_s}))
         if newest is not None:
             self._tick = finite(newest.values)
         if self._tick is not None and not 0.0 <= self._tick["stamp_s"] - self._sent_s < INTERVAL_S:
@@ -207,8 +211,19 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(*stop_robot(self.server.status_socket))
         elif self.path == "/can_stop":
             self._answer(*self.server.status.answer())
+        elif self.path in ("/note", "/mark"):
+            self._answer(
+                HTTPStatus.OK, send_order(self.server.status_socket, self.path[1:], text=self._text()).encode()
+            )
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+
+    def _text(self) -> str:
+        """Return the text that was sent; one that the daemon would refuse as too long is cut off."""
+        length = self.headers.get("Content-Length", "")
+        self.close_connection = True  # what is not read would be taken for the next request
+        text = self.rfile.read(min(int(length), LONGEST_TEXT) if length.isdecimal() else 0)
+        return text[:LONGEST_REQUEST].decode(errors="replace")
 
     def _refusal(self) -> str | None:
         """Return why this request is none of the own page; every route asks."""

@@ -53,13 +53,15 @@ def trial(
 
 
 def note(
-    text: Annotated[str, Option("for the log", metavar="TEXT")],
+    text: Annotated[str, Option("for the log", metavar="TEXT")] = "",
     *,
     socket: Socket,
     json: Json = False,
     mark: Annotated[bool, Option("mark this moment, such as a clap that a camera records")] = False,
 ) -> int:
     """Write a note or a marker into the log, and print its time."""
+    if not (text or mark):
+        raise usage_error("a note needs a text, such as 'mudskipper note \"rained last night\"'")
     with connect(socket) as client:
         written: dict[str, Any] = client.call("mark" if mark else "note", text=text)
     if json:

@@ -17,7 +17,8 @@ def send_order(path: Path, method: str, **params: Any) -> str:
         return end_motion(path, method).text
     try:
         with closing(StatusClient(path, ANSWER_S)) as client:
-            return f"{method}: {client.call(method, **params)}"
+            answer = client.call(method, **params)
+            return f"{method}: {answer if isinstance(answer, str) else answer['time']}"
     except (CallRefusedError, NotPermittedError) as problem:
         return f"{method} refused: {problem}"
     except NoDaemonError as problem:

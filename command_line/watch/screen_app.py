@@ -35,12 +35,18 @@ QUESTIONS = {
     "walk": "Let the robot walk until it is stopped?",
     "clear": "Clear the faults whose cause is gone?",
 }
+NOTES = ("good", "slipped", "stuck", "stone", "touched by hand", "re-mixed", "look here")  # by digit
+NOTE_OF_KEY = {str(digit): note for digit, note in enumerate(NOTES, 1)}
+NOTE_QUESTION = ", ".join(f"{digit} {note}" for digit, note in NOTE_OF_KEY.items())
 HELP = """
 space   stop: end the walk, raise the flippers, hold the pose
 d       disarm: switch torque off at once; the joints sink
 a       arm: switch torque on; the robot holds its pose
 w       walk with a depth that adapts to the mud, until a stop
 c       clear faults whose cause is gone
+m       mark this moment in the log, such as a clap on a film
+n       write a note into the log, one of a few by its digit;
+        'mudskipper note' takes any text
 f       every fault with its advice in full; up and down scroll
 j       plots of the joints' angles, then currents, then torques:
         left and right scroll by half a screen, up and down zoom,
@@ -137,6 +143,8 @@ class WatchApp(App[int]):
         Binding("a", "ask('arm')", "arm"),
         Binding("w", "ask('walk')", "walk"),
         Binding("c", "ask('clear')", "clear"),
+        Binding("m", "order('mark')", "mark"),
+        Binding("n", "ask('note')", "note"),
         Binding("f", "show('faults')", "faults"),
         Binding("j", "plot", "joints"),
         Binding("y", "confirm", show=False),
@@ -152,7 +160,7 @@ class WatchApp(App[int]):
         Binding("ctrl+c", f"exit({exit_codes.INTERRUPTED})", show=False, priority=True),
     ]
 
-    def __init__(self, feed: Feed, flippers: Sequence[str], period_s: float, send: Callable[[str], str]) -> None:
+    def __init__(self, feed: Feed, flippers: Sequence[str], period_s: float, send: Callable[..., str]) -> None:
         super().__init__(ansi_color=True)
         self.feed, self._flippers, self._period_s, self._send = feed, flippers, period_s, send
         self._asked = ""  # the order that waits for an answer
@@ -220,8 +228,10 @@ class WatchApp(App[int]):
             plots.update(self._view.text(history, plots.size.width, plots.size.height))
 
     def on_key(self, event: Key) -> None:
-        """Take any key but y as a no to a question; the actions of keys follow this."""
-        if event.key != "y":
+        """Take a digit as a note, and any key but y as a no to a question; the actions of keys follow this."""
+        if self._asked == "note" and event.key in NOTE_OF_KEY:
+            self.action_order("note", text=NOTE_OF_KEY[event.key])
+        elif event.key != "y":
             self._ask("")
 
     def action_ask(self, method: str) -> None:
@@ -232,10 +242,11 @@ class WatchApp(App[int]):
         self._asked = method
         question, messages = self.query_one("#question", Static), self.query_one("#messages")
         question.display, messages.display = bool(method), not method
-        question.update(Text(f"{QUESTIONS.get(method, '')} y: yes, any other key: no", BADGES["arming"]))
+        text = f"{QUESTIONS[method]} y: yes, any other key: no" if method in QUESTIONS else NOTE_QUESTION
+        question.update(Text(text, BADGES["arming"]))
 
     def action_confirm(self) -> None:
-        if self._asked:
+        if self._asked in QUESTIONS:
             self.action_order(self._asked)
 
     def action_show(self, panel: str) -> None:
@@ -267,14 +278,14 @@ class WatchApp(App[int]):
     def action_exit(self, status: int) -> None:
         self.exit(status)
 
-    def action_order(self, method: str) -> None:
+    def action_order(self, method: str, **params: str) -> None:
         """Send an order in a thread of its own: the screen goes on, and the next order need not wait."""
         self._ask("")
         self.say(f"{method} ...")
-        threading.Thread(target=self._deliver, args=(method,), name=method, daemon=True).start()
+        threading.Thread(target=self._deliver, args=(method,), kwargs=params, name=method, daemon=True).start()
 
-    def _deliver(self, method: str) -> None:
-        answer = self._send(method)
+    def _deliver(self, method: str, **params: str) -> None:
+        answer = self._send(method, **params)
         with suppress(RuntimeError, NoMatches):  # the operator has left meanwhile
             self.call_from_thread(self.say, answer)
 

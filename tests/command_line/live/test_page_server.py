@@ -1,6 +1,7 @@
 """The live page: rows reach every browser, however many there are, and no other page stops the robot."""
 
 import json
+import time
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from math import nan
@@ -37,9 +38,11 @@ def ask(page: PageServer, after: int = -1) -> dict[str, Any]:
     return dict(json.loads(connection.getresponse().read()))
 
 
-def post(page: PageServer, path: str = "/stop", **headers: str) -> tuple[int, str]:
+def post(page: PageServer, path: str = "/stop", body: str = "", **headers: str) -> tuple[int, str]:
     connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request("POST", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+    connection.request(
+        "POST", path, body.encode(), headers={name.replace("_", "-"): value for name, value in headers.items()}
+    )
     response = connection.getresponse()
     return response.status, response.read().decode()
 
@@ -62,6 +65,7 @@ def test_strides_and_events_reach_a_page_once_and_unknown_numbers_are_null(page:
     second = ask(page, first["number"])
     assert before["strides"] == [] and first["strides"][0]["index"] == 3 and first["strides"][0]["k_s"] == 5e5
     assert first["events"][0]["text"] == "walk" and first["ticks"][0]["body_x_m"] is None and first["lost"] == 7
+    assert first["events"][0]["wall_s"] == pytest.approx(1.0 + time.time() - time.monotonic(), abs=1.0)
     assert (second["ticks"][0]["stamp_s"], second["strides"], second["events"]) == (2.0, [], [])
 
 

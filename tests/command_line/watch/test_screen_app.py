@@ -139,7 +139,7 @@ def test_arming_walking_and_clearing_ask_first(resting: ServedRobot, short_folde
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         await pilot.press("a")
         await until(app, pilot, lambda: "Arm the robot?" in shown(app))
-        await pilot.press("n", "y")  # no question is open at the second key
+        await pilot.press("x", "y")  # no question is open at the second key
         await pilot.pause(4 * PERIOD_S)
         assert resting.mode is Mode.IDLE and "Arm the robot?" not in shown(app)
         await pilot.press("a", "y")
@@ -153,6 +153,26 @@ def test_arming_walking_and_clearing_ask_first(resting: ServedRobot, short_folde
 
     with resting.served(short_folder / "s"):
         drive(short_folder / "s", script)
+
+
+def test_a_digit_is_a_note_and_a_key_marks_the_moment(resting: ServedRobot, short_folder: Path) -> None:
+    sent: list[tuple[str, dict[str, str]]] = []
+
+    def send(method: str, **params: str) -> str:
+        sent.append((method, params))
+        return f"{method} done"
+
+    async def script(app: WatchApp, pilot: Pilot[int]) -> None:
+        await pilot.press("n")
+        await until(app, pilot, lambda: "2 slipped" in shown(app))
+        await pilot.press("y", "2", "2", "n", "x", "3")  # only the first 2 answers a question
+        await until(app, pilot, lambda: "note done" in shown(app))
+        await pilot.press("m")
+        await until(app, pilot, lambda: "mark done" in shown(app))
+
+    with resting.served(short_folder / "s"):
+        drive(short_folder / "s", script, send=send)
+    assert sent == [("note", {"text": "slipped"}), ("mark", {})]
 
 
 def test_help_explains_every_key_and_keeps_the_alarm(walked: ServedRobot, short_folder: Path) -> None:
