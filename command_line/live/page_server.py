@@ -9,6 +9,7 @@ red where a stop would not reach the robot.
 
 import json
 import re
+import sys
 import threading
 import time
 from collections import deque
@@ -182,6 +183,11 @@ class _Server(ThreadingHTTPServer):
         self.own_page, self.recent, self.status_socket = own_page(host, names), recent, status_socket
         self.status = SharedStatus(status_socket)
         super().__init__((host, port), _Handler)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report a defect, but not a browser that has gone."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
