@@ -1,18 +1,23 @@
 """Runs `mudskipper simulate`: the simulated robot alone, for a daemon in another terminal."""
 
 import os
+import signal
 import sys
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from command_line.errors import usage_error
+from command_line import exit_codes
+from command_line.errors import CommandError, usage_error
 from command_line.screen import complain
 from command_line.shared_options import SIMULATED, Seed
+from drivers.can.bus_lock import BusRole, bus_owner
 from experiments.study.option import Option
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.toml_records import read_text
 from simulation.harness import peer
-from simulation.harness.local_setup import configuration_text, make_buses, named_folder, write_local_setup
+from simulation.harness.local_setup import configuration_text, local_copy, make_buses, named_folder, write_local_setup
 from simulation.harness.world import load_world
 from simulation.mud.clay import MUDS
 
@@ -20,7 +25,9 @@ from simulation.mud.clay import MUDS
 def simulate(
     *,
     bus: Annotated[str, Option("of the local bus")] = SIMULATED,
-    config: Annotated[Path | None, Option("use the buses of this configuration")] = None,
+    config: Annotated[Path | None, Option("the robot of this configuration, on its buses")] = None,
+    local: Annotated[bool, Option("with --config: on local buses, whatever its interfaces are")] = False,
+    reset: Annotated[bool, Option("move the joints of the robot that is simulated back into their range")] = False,
     mud: Annotated[
         tuple[str, ...],
         Option("water content: 48.5, 53.1, 45.3", metavar="W", choices=tuple(MUDS), alternative="ground"),
@@ -29,24 +36,51 @@ def simulate(
     on_blocks: Annotated[bool, Option("no mud: the flippers move in air, for the bench", alternative="ground")] = False,
     seed: Seed = 1,
 ) -> int:
-    if world:
-        complain(*load_world(world).warnings)  # before anything is made; the peer reads it again
-    ground = peer.Ground(waters=mud, world=world, on_blocks=on_blocks)
-    if config:
-        return peer.simulate(load_configuration(config), ground, seed)
+    if local and not config:
+        raise usage_error("--local belongs to --config FILE; without a file the robot is local anyway")
     try:
         folder = named_folder(bus)
     except ValueError as problem:
         raise usage_error(f"--bus {problem}") from None
+    if reset:
+        return _reset(config if config and not local else folder / "mudskipper.toml")
+    if world:
+        complain(*load_world(world).warnings)  # before anything is made; the peer reads it again
+    ground = peer.Ground(waters=mud, world=world, on_blocks=on_blocks)
+    if config and not local:
+        configuration = load_configuration(config)
+        return peer.simulate(
+            configuration, ground, seed, partial(_announce, config, configuration, f"--config {config}")
+        )
     logs = Path("logs").absolute()
+    text = configuration_text(folder, logs)
+    if config:
+        parse_configuration(read_text(config), config)
+        text = local_copy(read_text(config), folder, logs)
     make_buses(folder)
-    configuration = parse_configuration(configuration_text(folder, logs))
-    return peer.simulate(configuration, ground, seed, partial(_write_and_announce, folder, logs))
+    configuration = parse_configuration(text, config)
+    named = "" if bus == SIMULATED else f"--bus {bus}"
+    return peer.simulate(
+        configuration,
+        ground,
+        seed,
+        lambda: _announce(write_local_setup(folder, logs, text), configuration, named),
+    )
 
 
-def _write_and_announce(folder: Path, logs: Path) -> None:
-    path = write_local_setup(folder, logs)
+def _announce(path: Path, configuration: Configuration, named: str) -> None:
     programs = Path(sys.executable).parent
     print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
-    print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status")
-    print(f"'kill -USR1 {os.getpid()}' moves joints back that lie beyond their limits.", flush=True)
+    print(f"  export MUDSKIPPER_SOCKET={configuration.status.socket}; {programs}/mudskipper status")
+    reset = f"mudskipper simulate --reset {named}".rstrip()
+    print(f"'{reset}' moves joints back that lie beyond their limits.", flush=True)
+
+
+def _reset(path: Path) -> int:
+    """Signal the process that simulates the robot of this configuration; the lock of its buses names it."""
+    for bus in parse_configuration(read_text(path), path).bus.values():
+        if pid := bus_owner(BusRole.DRIVES, bus.interface, bus.channel):
+            os.kill(pid, signal.SIGUSR1)
+            print("moved back; 'mudskipper clear' clears the fault")
+            return exit_codes.OK
+    raise CommandError(f"no robot is simulated on the buses of {path}: 'mudskipper simulate' makes one")

@@ -261,7 +261,7 @@ class FaultKind(StrEnum):
     JOINT_MOVING = (
         "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 40,
         "A joint moves while torque is off.", "The {subject} joint moves while torque is off.",
-        "wait until it is at rest",
+        "hold it still: 'mudskipper arm --wait' arms once it is at rest",
     )
     JOINT_CURRENT = (
         "joint_current", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 6,

@@ -150,7 +150,7 @@ IN_MODE: dict[Mode, str] = {  # why a request is refused, and what to do
     Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
     Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
     Mode.ARMING: "the drives are being armed; try again in a moment",
-    Mode.HOLD: "the robot already holds its pose",
+    Mode.HOLD: "the robot already holds its pose; 'mudskipper walk' or 'mudskipper disarm' goes on",
     Mode.WALKING: "the robot walks; 'mudskipper stop' first",
     Mode.STOPPING: "the robot is stopping; try again in a moment",
     Mode.FAULT: "a fault is present; read 'mudskipper status', then 'mudskipper clear'",
@@ -171,7 +171,7 @@ class Refusal(NamedTuple):
         if self.faults:
             return " ".join(fault.message for fault in self.faults)
         if self.request is Request.CLEAR and self.mode is Mode.HOLD:
-            return "nothing to clear: the robot holds its pose"
+            return "nothing to clear: the robot holds its pose; 'mudskipper walk' goes on"
         return IN_MODE[self.mode]
 
 

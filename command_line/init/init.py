@@ -93,6 +93,7 @@ def init(
     with file.open("x", encoding="utf-8") as opened:
         opened.write(text)
     print(f"written  {file}\ncheck it with: mudskipper doctor --config {file}")
+    print(f"try it without its drives: mudskipper simulate --config {file} --local")
     return exit_codes.OK
 
 

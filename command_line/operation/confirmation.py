@@ -37,7 +37,8 @@ class Confirmation(NamedTuple):
     @property
     def text(self) -> str:
         if not self.reached:
-            return f"still {self.mode} after {LONGEST_S[self.method]:g} s"
+            advice = "; 'mudskipper disarm' switches torque off at once" if self.method == "stop" else ""
+            return f"still {self.mode} after {LONGEST_S[self.method]:g} s{advice}"
         if self.unconfirmed:
             return f"{self.method} is not confirmed by {', '.join(self.unconfirmed)}"
         return f"{self.method}: every drive has confirmed it"

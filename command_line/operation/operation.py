@@ -17,16 +17,19 @@ from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
-from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
+from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured, complain
+from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
 from control.computing.suggestion import suggestion
+from drivers.can.run_folder import find_run_folder
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
-from operator_client.status_client import DroppedError, NoDaemonError, StatusClient
+from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, StatusClient
 
 ARMING_S = 5.0
 CLEARING_S = 1.5
+WAITING_S = 30.0
+BEYOND_RANGE = "joint_position"  # a fault
 LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
@@ -55,9 +58,11 @@ def arm(
     socket: Socket,
     json: Json = False,
     force: Annotated[str, Option("overrule this one check, such as watchdog_unknown", metavar="CHECK")] = "",
+    wait: Annotated[bool, Option("wait up to 30 s for what ends by itself, such as a joint that moves")] = False,
     take_over: TakeOver = False,
 ) -> int:
-    return _change_mode("arm", "hold", socket, json, {"force": force, "take_over": take_over})
+    params = {"force": force, "take_over": take_over}
+    return _change_mode("arm", "hold", socket, json, params, WAITING_S if wait else 0.0)
 
 
 def walk(
@@ -153,9 +158,21 @@ def clear(
         report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
     messages = [fault["message"] for fault in stopping_faults(report)]
     if messages or not _is_at_rest(report):
-        raise _refusal(f"the cause is still there: {' '.join(messages) or report['mode']}")
+        raise _refusal(
+            f"the cause is still there: {' '.join(messages) or report['mode']}{_reset_advice(socket, report)}"
+        )
     print_mode("clear", json, report["mode"])
     return exit_codes.OK
+
+
+def _reset_advice(socket: Path, report: dict[str, Any]) -> str:
+    """Return how a joint beyond its range is moved back: by hand, or by the simulation that this socket belongs to."""
+    if all(fault["name"] != BEYOND_RANGE for fault in stopping_faults(report)):
+        return ""
+    if socket.parent.parent != find_run_folder():
+        return " Move it back by hand, then 'mudskipper clear'"
+    named = "" if socket.parent.name == SIMULATED else f" --bus {socket.parent.name}"
+    return f" 'mudskipper simulate --reset{named}' moves it back, then 'mudskipper clear'"
 
 
 def _is_at_rest(report: dict[str, Any]) -> bool:
@@ -171,10 +188,12 @@ def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
-def _change_mode(command: str, mode: str, socket: Path, as_json: bool, params: dict[str, Any]) -> int:
-    """Send the command and wait until the robot is in the mode that it asks for."""
+def _change_mode(
+    command: str, mode: str, socket: Path, as_json: bool, params: dict[str, Any], waiting_s: float = 0.0
+) -> int:
+    """Send the command, again for so long as it is refused, and wait for the mode that it asks for."""
     with connect(socket) as client:
-        client.call(command, **params)
+        _call_patiently(client, command, params, waiting_s)
         report = _poll(client, lambda status: status["mode"] in (mode, "fault"), ARMING_S)
     if report["mode"] == "fault":
         raise _refusal(report["fault"]["message"] if report["fault"] else report["notice"])
@@ -182,6 +201,22 @@ def _change_mode(command: str, mode: str, socket: Path, as_json: bool, params: d
         raise CommandError(f"still {report['mode']} after {ARMING_S:g} s", status=exit_codes.TIMED_OUT)
     print_mode(command, as_json, mode, report["notice"])
     return exit_codes.OK
+
+
+def _call_patiently(client: StatusClient, command: str, params: dict[str, Any], waiting_s: float) -> None:
+    """Call until it is accepted. Raises CallRefusedError after `waiting_s`, and at once for what a person must end."""
+    deadline_s, reported = time.monotonic() + waiting_s, False
+    while True:
+        try:
+            client.call(command, **params)
+            return
+        except CallRefusedError as problem:
+            waits = time.monotonic() < deadline_s and client.call("status")["mode"] in ("boot", "idle")
+            if not waits:
+                raise
+            complain(*[f"{problem} Waiting for that to end; Ctrl-C gives up"] * (not reported))
+            reported = True
+            time.sleep(POLL_S)
 
 
 def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_s: float) -> dict[str, Any]:

@@ -44,7 +44,9 @@ class BusLock:
             self._socket.close()
             if problem.errno != errno.EADDRINUSE:
                 raise
-            raise BusTakenError(f"{_owner_of(name)} {DOES[role]} its drives already; end it first") from None
+            pid = _owner_of(name)
+            owner = f"process {pid}" if pid else "another program"
+            raise BusTakenError(f"{owner} {DOES[role]} its drives already; end it first") from None
 
     def close(self) -> None:
         self._socket.close()
@@ -60,13 +62,18 @@ def _lock_name(role: BusRole, interface: str, channel: str) -> bytes:
     return b"\0" + f"mudskipper-{role}-{digest}".encode()
 
 
-def _owner_of(name: bytes) -> str:
-    """Name the process that owns a lock. The kernel reports who listens without its help."""
+def bus_owner(role: BusRole, interface: str, channel: str) -> int:
+    """Return the process that has the role on a bus; 0 where none has it."""
+    return _owner_of(_lock_name(role, interface, channel))
+
+
+def _owner_of(name: bytes) -> int:
+    """Return the process that owns a lock, or 0. The kernel reports who listens without its help."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.setblocking(False)
         try:
             probe.connect(name)
             pid, _, _ = CREDENTIALS.unpack(probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
-        except OSError:  # its queue is full, or it has just ended
-            return "another program"
-    return f"process {pid}"
+        except OSError:  # its queue is full, or there is none
+            return 0
+    return int(pid)

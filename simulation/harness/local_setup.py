@@ -6,7 +6,11 @@ all processes share, signals arrive less punctually than on a robot, so their bo
 """
 
 import json
+import tomllib
 from pathlib import Path
+from typing import Any
+
+import tomlkit
 
 from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
@@ -112,11 +116,11 @@ def make_buses(folder: Path) -> None:
         make_own_folder(folder / name)
 
 
-def write_local_setup(folder: Path, logs: Path) -> Path:
+def write_local_setup(folder: Path, logs: Path, text: str = "") -> Path:
     """Return the configuration's path, for `mudskipperd --config` and for the simulated robot."""
     make_buses(folder)
     path = folder / "mudskipper.toml"
-    write_private_file(path, configuration_text(folder, logs.absolute()))
+    write_private_file(path, text or configuration_text(folder, logs.absolute()))
     write_private_file(
         folder / "flat_endpoints.json", json.dumps(PUBLISHED_NUMBERS, indent=1)
     )  # as the drives' maker does
@@ -124,7 +128,11 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
 
 
 def configuration_text(folder: Path, logs: Path) -> str:
-    """Write paths as JSON strings, which are TOML strings too."""
+    return CONFIGURATION.format(**_paths(folder, logs))
+
+
+def _paths(folder: Path, logs: Path) -> dict[str, str]:
+    """Return paths as JSON strings, which are TOML strings too."""
     paths = {
         "left": folder / "left",
         "right": folder / "right",
@@ -132,4 +140,24 @@ def configuration_text(folder: Path, logs: Path) -> str:
         "status": folder / "mudskipper.sock",
         "pose": folder / "pose.sock",
     }
-    return CONFIGURATION.format(**{name: json.dumps(str(path)) for name, path in paths.items()})
+    return {name: json.dumps(str(path)) for name, path in paths.items()}
+
+
+def local_copy(text: str, folder: Path, logs: Path) -> str:
+    """Return a robot's configuration for this computer: local buses, and sockets, bounds and logs as of `simulate`.
+
+    Geometry, drives, gait, limits and gains stay those of the robot.
+    """
+    document: dict[str, Any] = tomlkit.parse(text)
+    for number, bus in enumerate(document["bus"].values()):
+        bus.pop("options", None)
+        bus |= {"interface": "mudskipper_local", "channel": str(make_own_folder(folder / f"bus{number}"))}
+    for group in ("read_group", "drive_group"):  # of the robot's computer
+        document.get("status", {}).pop(group, None)
+    local = tomllib.loads(TAIL.format(**_paths(folder, logs)))
+    document.setdefault("watchdog_endpoints", tomlkit.aot()).extend(local.pop("watchdog_endpoints"))
+    if document.get("pose", {}).get("source") not in (None, "", "none"):
+        local["pose"]["source"] = "socket"
+    for section, values in local.items():
+        document.setdefault(section, tomlkit.table()).update(values)
+    return tomlkit.dumps(document)

@@ -3,6 +3,7 @@
 It takes from the configuration what a real robot's bench fixes: buses, node ids, signs, geometry, a fixed base. It
 sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who
 moves the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
+`mudskipper simulate --reset` sends it.
 """
 
 import argparse
@@ -133,7 +134,7 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
     except ConfigurationError as problem:
         return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
     except BusError as problem:
-        return _refuse(str(problem))
+        return _refuse(f"{problem}. 'mudskipper simulate --config FILE --local' needs none of its interfaces")
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())

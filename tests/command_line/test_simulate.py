@@ -14,11 +14,12 @@ from command_line import shared_options as shared
 from command_line.main import main
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
-from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.loading import load_configuration, parse_configuration
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.blocks import RESTING_RAD
 from simulation.harness.local_setup import configuration_text, named_folder, write_local_setup
+from tests.folders import ROOT
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 
@@ -93,14 +94,14 @@ def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers
     assert plant.angles_rad == pytest.approx((0.0, RESTING_RAD, 0.0, RESTING_RAD))
 
 
-def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reset_moves_the_flippers_back_as_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class HandedPeer(peer.Peer):
         """A simulated robot with its joints at their stops; it runs for one step."""
 
         def run(self) -> None:
             for arm in self.robot.plant.arms:
                 arm.sweep_rad, arm.adduction_rad = END_STOPS_RAD
-            signal.raise_signal(signal.SIGUSR1)
+            assert main(["simulate", "--reset", "--config", str(short_folder / "mudskipper.toml")]) == exit_codes.OK
             self._pose.step = lambda now_s, plant: self.end(0, None)  # type: ignore[method-assign]
             super().run()
             lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
@@ -115,6 +116,24 @@ def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatc
         for number, handler in before.items():
             signal.signal(number, handler)
     assert len(lying) == 2 and all(abs(sweep) < 0.05 and abs(adduction) < 0.5 for sweep, adduction in lying)
+
+
+def test_any_configuration_is_simulated_on_local_buses(
+    short_folder: Path, peers: list[StillPeer], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
+    monkeypatch.chdir(short_folder)
+    text = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+    text = text.replace("[status]", '[status]\ndrive_group = "nobody-here"') + "[bus.left.options]\nfd = false\n"
+    Path("robot.toml").write_text(text.replace('"socketcan"', '"kvaser"'), encoding="utf-8")
+    assert main(["simulate", "--config", "robot.toml", "--local"]) == exit_codes.OK
+    path = named_folder(shared.SIMULATED) / "mudskipper.toml"
+    assert f"mudskipperd --config {path}" in capsys.readouterr().out
+    local, robot = load_configuration(path), parse_configuration(text)
+    assert {bus.interface for bus in local.bus.values()} == {"mudskipper_local"}
+    assert (local.drive, local.geometry, local.gait) == (robot.drive, robot.geometry, robot.gait)
+    assert main(["simulate", "--reset"]) == exit_codes.UNHEALTHY  # it has ended
+    assert main(["simulate", "--local"]) == exit_codes.USAGE
 
 
 @pytest.mark.parametrize("command", ["simulate", "demo"])
