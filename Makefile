@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --duration
 # Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
-.PHONY: help lock setup demo test test-compiled test-vm mutants dst claims lint docs docs-links man clean
+.PHONY: help lock setup demo test test-compiled test-vm test-page mutants dst claims lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -36,6 +36,9 @@ test-compiled: .venv/test  ## build the compiled tick and compare it with the so
 test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m verification.virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v verification/virtual_machine $(ARGS)
+
+test-page: .venv/test  ## open the live page in a headless Chromium, at the widths of a phone and of a desk; needs chromium-driver
+	$(BIN)/python -m pytest -v verification/browser $(ARGS)
 
 mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tests must notice each change
 	$(BIN)/python -m tests.mutants $(ARGS)
