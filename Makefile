@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --duration
 # Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
-.PHONY: help lock setup demo test test-compiled test-vm mutants dst claims lint docs docs-links man clean
+.PHONY: help lock setup demo test test-compiled test-vm test-page mutants dst claims lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -37,6 +37,9 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 	@$(BIN)/python -m verification.virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v verification/virtual_machine $(ARGS)
 
+test-page: .venv/test  ## open the live page in a headless Chromium, at the widths of a phone and of a desk; needs chromium-driver
+	$(BIN)/python -m pytest -v verification/browser $(ARGS)
+
 mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tests must notice each change
 	$(BIN)/python -m tests.mutants $(ARGS)
 
@@ -54,8 +57,8 @@ lint: .venv/test  ## run ruff and mypy --strict
 lock: .venv/setup  ## write requirements/*.txt from pyproject.toml; needs the Internet
 	@$(PIP) "uv>=0.5"
 	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen pyproject.toml - --output-file requirements/robot.txt $(ARGS)
-	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra plots --extra data pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
-	@$(LOCK) --extra plots --extra screen --extra serial --extra data --extra cluster --extra test --extra docs pyproject.toml --output-file requirements/development.txt $(ARGS)
+	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra plots --extra data --extra inputs pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
+	@$(LOCK) --extra plots --extra screen --extra serial --extra data --extra cluster --extra test --extra docs --extra inputs pyproject.toml --output-file requirements/development.txt $(ARGS)
 	@printf 'mypy>=1.14,<3\nsetuptools>=77\n' | $(LOCK) - --output-file requirements/compiler.txt $(ARGS)
 
 docs: .venv/test  ## build the documentation into build/docs; a warning is an error

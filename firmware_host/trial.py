@@ -25,8 +25,8 @@ KEYS = {
     "note": "free text",
 }
 KEY = re.compile(r"[a-z][a-z0-9_]{0,31}")
-LONGEST_VALUE = 1000  # characters
-LONGEST_TRIAL = 3000  # bytes: a trial is one event, which goes through a pipe at once
+LONGEST_VALUE = 900  # characters: as an event, with four bytes for each, it goes through a pipe at once
+LONGEST_TRIAL = 3000  # bytes, for the same reason
 MOST_WATER = 100.0  # %
 NAMED = ("mud", "trial")  # in the name of a file
 LONGEST_NAME = 40  # of each of them there

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -75,13 +76,12 @@ class Client:
 
         `trial` describes the walk in its log, a new one: mud, water, trial, operator, tags and note.
         """
-        described = {key: str(value) for key, value in trial.items()}
-        self._move("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}), **described)
+        depth = {} if depth_m is None else {"depth_m": depth_m}
+        self._move("walk", strides=strides, **depth, **_texts(trial))
 
     def trial(self, **defaults: object) -> Report:
-        """Return how walks are described: the `defaults` and the `present` walk. Keywords change the defaults."""
-        changes = {key: str(value) for key, value in defaults.items()}
-        return dict(self._client.call("trial_set", **changes) if changes else self._client.call("trial"))
+        """Return `defaults` and the `present` description of walks; keywords change defaults, None removes one."""
+        return dict(self._client.call("trial_set", **_texts(defaults)) if defaults else self._client.call("trial"))
 
     def note(self, text: str) -> Report:
         """Write a note into the log, and return its `time` and its `stamp_s`."""
@@ -130,3 +130,11 @@ class Client:
                 self.renew()
             time.sleep(POLL_S)
         return report
+
+
+def _texts(trial: Mapping[str, object]) -> dict[str, str]:
+    """Return the values of a description as the daemon takes them."""
+    joined = {
+        key: ",".join(map(str, value)) if isinstance(value, list | tuple) else value for key, value in trial.items()
+    }
+    return {key: "" if value is None else str(value) for key, value in joined.items()}

@@ -1,15 +1,18 @@
 """Serves one self-contained page with a live view of the robot, and a STOP that goes through the socket's rights.
 
-The page receives server-sent events (HTML standard, section 9.2), ten a second, each with the newest tick and every
-stride and event since the last one. Every viewer has a queue of its own; one that hangs loses its own messages alone.
-Every request must come from this server's own page (own_page.py); a stop needs a header too that no other site's page
-can send. The page asks over the same path whether a stop would reach the robot, and says so in red where it would not.
+The page asks several times a second for what is new since it asked last: ticks, ten a second, strides and events. It
+holds no connection open, because a browser opens six to one server: with a stream for each page, the seventh page would
+show nothing and stop nothing. Every request must come from this server's own page (own_page.py); a stop needs a header
+too that no other site's page can send. The page asks for the daemon's status over the same path as a stop, and says in
+red where a stop would not reach the robot.
 """
 
 import json
-import queue
+import re
+import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Collection, Sequence
 from contextlib import closing, suppress
 from http import HTTPStatus
@@ -32,70 +35,71 @@ from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PAGE = Path(__file__).with_name("page.html")
-INTERVAL_S = 0.1  # between two messages
-QUEUED = 20  # messages for one viewer: two seconds
-RECENT_STRIDES = 60  # that a new viewer gets
+INTERVAL_S = 0.1  # between two ticks
+KEPT = {"ticks": 200, "strides": 60, "events": 200}  # that a new page gets: ticks of 20 s
 LONGEST_TEXT = 1 << 20  # bytes that are read of a note
 STOP_HEADER = "X-Mudskipper"
 ANSWER_S = 2.0  # of the daemon, whether it would take a stop
+ROWS = re.compile(r"/rows\?after=(-?\d{1,18})")
+STATUS_S = 0.8  # for which a status serves all pages
+
+Values = dict[str, Any]
 
 
-class Viewer:
-    """Owns the messages that one browser has not fetched."""
-
-    def __init__(self) -> None:
-        self._messages: queue.Queue[str] = queue.Queue(QUEUED)
-        self.lost = 0
-
-    def put(self, message: dict[str, Any]) -> None:
-        try:
-            self._messages.put_nowait(json.dumps(message | {"lost": message.get("lost", 0) + self.lost}))
-        except queue.Full:
-            self.lost += 1
-
-    def get(self, timeout_s: float) -> str | None:
-        try:
-            return self._messages.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-
-
-class Viewers:
-    """Owns the viewers and what a new one has to know."""
+class RecentRows:
+    """Owns what pages may still ask for. A row has the number of its interval, which a page names when it asks."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._viewers: list[Viewer] = []
-        self._robot: dict[str, Any] = {}
-        self._strides: list[dict[str, Any]] = []
-        self._tick: dict[str, Any] | None = None
+        self._robot: Values = {}
+        self._rows: dict[str, deque[tuple[int, Values]]] = {name: deque(maxlen=most) for name, most in KEPT.items()}
+        self._newest = self._first = self._lost = 0
 
-    def begin(self, robot: dict[str, Any]) -> None:
+    def begin(self, robot: Values) -> None:
+        """Forget the rows of an earlier daemon."""
         with self._lock:
-            self._robot, self._strides, self._tick = robot, [], None
-            self._send({"robot": robot})
+            self._robot = robot
+            self._first = self._newest = self._newest + 1
+            for kept in self._rows.values():
+                kept.clear()
 
-    def add(self) -> Viewer:
-        viewer = Viewer()
+    def add(self, tick: Values, strides: list[Values], events: list[Values], lost: int) -> None:
         with self._lock:
-            known_robot = {"robot": self._robot} if self._robot else {}
-            viewer.put(known_robot | {"tick": self._tick, "strides": self._strides})
-            self._viewers.append(viewer)
-        return viewer
+            self._newest += 1
+            self._lost = lost
+            for kept, rows in zip(self._rows.values(), ([tick], strides, events), strict=True):
+                kept += [(self._newest, row) for row in rows]
 
-    def remove(self, viewer: Viewer) -> None:
+    def after(self, number: int) -> Values:
+        """Return what came after a page's last answer; all there is and the robot if that is too long ago."""
         with self._lock:
-            self._viewers.remove(viewer)
+            goes_on = max(self._first, self._newest - KEPT["ticks"]) <= number <= self._newest
+            since = number if goes_on else -1
+            rows = {name: [row for each, row in kept if each > since] for name, kept in self._rows.items()}
+            robot = {} if goes_on else {"robot": self._robot}
+            clock_s = time.time() - time.monotonic()
+            return {"number": self._newest, "wall_minus_monotonic_s": clock_s, "lost": self._lost, **rows, **robot}
 
-    def publish(self, message: dict[str, Any]) -> None:
-        with self._lock:
-            self._tick = message["tick"] or self._tick
-            self._strides = [*self._strides, *message["strides"]][-RECENT_STRIDES:]
-            self._send(message)
 
-    def _send(self, message: dict[str, Any]) -> None:
-        for viewer in self._viewers:
-            viewer.put(message)
+class SharedStatus:
+    """Owns the daemon's last status as JSON, so that many pages cost the loop one answer."""
+
+    def __init__(self, socket: Path) -> None:
+        self._socket = socket
+        self._asking = threading.Lock()
+        self._asked_s = float("-inf")
+        self._answer = HTTPStatus.CONFLICT, b""
+
+    def answer(self) -> tuple[HTTPStatus, bytes]:
+        """Return the status, or why a stop would not reach the robot; while another page asks, the one before."""
+        if self._asking.acquire(blocking=not self._answer[1]):
+            try:
+                if time.monotonic() - self._asked_s > STATUS_S:
+                    self._answer = ask_status(self._socket)
+                    self._asked_s = time.monotonic()
+            finally:
+                self._asking.release()
+        return self._answer
 
 
 class PageServer:
@@ -103,21 +107,21 @@ class PageServer:
 
     def __init__(self, host: str, port: int, status_socket: Path, names: Collection[str] = ()) -> None:
         """`names` are those under which browsers may open the page, in addition to the address."""
-        self._viewers = Viewers()
-        self._server = _Server(host, port, self._viewers, status_socket, names)
+        self._recent = RecentRows()
+        self._server = _Server(host, port, self._recent, status_socket, names)
         self.port = int(self._server.server_address[1])
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         self._reset()
 
     def _reset(self) -> None:
-        self._tick: dict[str, Any] | None = None
+        self._tick: Values | None = None
         self._sent_s = 0.0
-        self._strides: list[dict[str, Any]] = []
-        self._events: list[dict[str, Any]] = []
+        self._strides: list[Values] = []
+        self._events: list[Values] = []
 
     def begin(self, source: LiveRows) -> None:
         self._reset()
-        self._viewers.begin(robot_facts(source.configuration_text))
+        self._recent.begin(robot_facts(source.configuration_text))
 
     def take(self, rows: Sequence[LiveRow], lost: int) -> None:
         newest = None
@@ -132,7 +136,7 @@ class PageServer:
             self._tick = finite(newest.values)
         if self._tick is not None and not 0.0 <= self._tick["stamp_s"] - self._sent_s < INTERVAL_S:
             self._sent_s = self._tick["stamp_s"]
-            self._viewers.publish({"tick": self._tick, "strides": self._strides, "events": self._events, "lost": lost})
+            self._recent.add(self._tick, self._strides, self._events, lost)
             self._strides, self._events = [], []
 
     def close(self) -> None:
@@ -140,7 +144,7 @@ class PageServer:
         self._server.server_close()
 
 
-def robot_facts(configuration_text: str) -> dict[str, Any]:
+def robot_facts(configuration_text: str) -> Values:
     """Return what the page draws the robot with; the defaults where the configuration is of another version."""
     name, geometry, rig = "", FlipperGeometry(), TWO_FLIPPERS
     with suppress(ConfigurationError):
@@ -157,7 +161,7 @@ def robot_facts(configuration_text: str) -> dict[str, Any]:
     }
 
 
-def finite(values: dict[str, Any]) -> dict[str, Any]:
+def finite(values: Values) -> Values:
     """Replace numbers that JSON does not have by None."""
     return {name: _finite(value) for name, value in values.items()}
 
@@ -173,9 +177,17 @@ class _Server(ThreadingHTTPServer):
 
     daemon_threads = True  # a browser that hangs must not keep this program
 
-    def __init__(self, host: str, port: int, viewers: Viewers, status_socket: Path, names: Collection[str]) -> None:
-        self.own_page, self.viewers, self.status_socket = own_page(host, names), viewers, status_socket
+    request_queue_size = 50  # connections of pages that are opened at once
+
+    def __init__(self, host: str, port: int, recent: RecentRows, status_socket: Path, names: Collection[str]) -> None:
+        self.own_page, self.recent, self.status_socket = own_page(host, names), recent, status_socket
+        self.status = SharedStatus(status_socket)
         super().__init__((host, port), _Handler)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report a defect, but not a browser that has gone."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -189,8 +201,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.FORBIDDEN, refused.encode())
         elif self.path == "/":
             self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
-        elif self.path == "/rows":
-            self._stream()
+        elif number := ROWS.fullmatch(self.path):
+            rows = self.server.recent.after(int(number[1]))
+            self._answer(HTTPStatus.OK, json.dumps(rows).encode(), "application/json")
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 
@@ -203,7 +216,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/stop":
             self._answer(*stop_robot(self.server.status_socket))
         elif self.path == "/can_stop":
-            self._answer(*can_stop(self.server.status_socket))
+            self._answer(*self.server.status.answer())
         elif self.path in ("/note", "/mark"):
             self._answer(
                 HTTPStatus.OK, send_order(self.server.status_socket, self.path[1:], text=self._text()).encode()
@@ -223,22 +236,10 @@ class _Handler(BaseHTTPRequestHandler):
         arrived_at = str(self.connection.getsockname()[0])
         return self.server.own_page.refusal(self.headers.get("Host", ""), self.headers.get("Origin"), arrived_at)
 
-    def _stream(self) -> None:
-        viewer = self.server.viewers.add()
-        self.send_response(HTTPStatus.OK)
-        self.send_header("Content-Type", "text/event-stream")
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("Connection", "close")
-        self.end_headers()
-        with suppress(OSError):  # the browser has gone
-            while True:
-                message = viewer.get(1.0)
-                self.wfile.write(f"data: {message}\n\n".encode() if message else b": no rows\n\n")
-        self.server.viewers.remove(viewer)
-
     def _answer(self, status: HTTPStatus, content: bytes, kind: str = "text/plain; charset=utf-8") -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
         self.send_header("Content-Length", str(len(content)))
         self.send_header("Content-Security-Policy", "default-src 'self' 'unsafe-inline'; frame-ancestors 'none'")
         self.end_headers()
@@ -254,11 +255,10 @@ def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
     return HTTPStatus.OK if answer.confirmed else HTTPStatus.CONFLICT, answer.text.encode()
 
 
-def can_stop(status_socket: Path) -> tuple[HTTPStatus, bytes]:
-    """Answer whether the daemon would take a stop and show that the drives have confirmed it."""
+def ask_status(status_socket: Path) -> tuple[HTTPStatus, bytes]:
+    """Return the daemon's status as JSON, or why it would not take a stop and show that the drives confirm it."""
     try:
         with closing(StatusClient(status_socket, ANSWER_S)) as client:
-            client.call("status")
+            return HTTPStatus.OK, json.dumps(client.call("status")).encode()
     except (CallRefusedError, NotPermittedError, NoDaemonError) as problem:
         return HTTPStatus.CONFLICT, str(problem).encode()
-    return HTTPStatus.OK, b"ready"

@@ -104,6 +104,7 @@ class OperatorCalls:
             "moving": loop.controller.moving,
             **self._fault_reports(),
             "forced": bool(loop.forced),
+            "power_cut": loop.fault_monitor.power_cut or None,
             "notice": loop.events.notice,
             "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,
@@ -125,14 +126,15 @@ class OperatorCalls:
 
     def _fault_reports(self) -> dict[str, Any]:
         """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""
-        present = [each for each in self._loop.aged_faults if not is_settling(each)]
-        shown = self._loop.fault or next((fault for fault, _ in present if fault.kind.blocks is not Blocks.NO), None)
+        present = self._loop.aged_faults
+        shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
         gravest = present
         if len(present) > FAULTS_PER_ANSWER:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
             gravest = ordered[:FAULTS_PER_ANSWER]
         faults = {each.fault: _fault_report(*each) for each in gravest}
-        causes, stop = group_by_cause(gravest, self._bus_of), self._loop.events.stop_fault
+        lasting = [each for each in gravest if not is_settling(each)]
+        causes, stop = group_by_cause(lasting, self._bus_of), self._loop.events.stop_fault
         if stop:
             causes.sort(key=lambda cause: not cause.includes(stop))
         return {

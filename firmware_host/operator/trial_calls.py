@@ -1,6 +1,6 @@
 """The methods of the status socket that describe a walk: its trial, notes and markers.
 
-Defaults hold until they are changed, also after a restart of the daemon (firmware_host.trial.py). A walk with a
+Defaults hold until they are changed, also after a restart of the daemon (firmware_host/trial.py). A walk with a
 description begins a trial, and so does one without it after a trial, since the trial's log must not go on.
 """
 

@@ -23,6 +23,11 @@ def test_joints_move_under_a_lease(bench: Bench) -> None:
         robot.move(left_sweep_rad=0.2)
         with pytest.raises(mudskipper.CallRefusedError), mudskipper.Client(bench.socket) as other:
             other.walk(1)
+        assert robot.trial(mud="A", water=49.5, plate=None)["defaults"] == {"mud": "A", "water": "49.5"}
+        robot.walk(strides=1, tags=["wet", "warm"], trial=3)
+        assert robot.status()["trial"] == {"mud": "A", "water": "49.5", "tags": "wet,warm", "trial": "3"}
+        assert robot.trial(mud=None, water=None)["defaults"] == {}
+        robot.wait_for("hold")
         robot.disarm()
         robot.wait_for("idle")
     with mudskipper.Client(bench.socket) as robot:

@@ -9,51 +9,43 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from http.client import HTTPConnection, HTTPResponse
+from http.client import HTTPConnection
 from typing import Any
 
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
 ADDRESS = "127.0.0.1"
-RETRY_S = 0.05  # a browser waits for three seconds or so
+RETRY_S = 0.05
 
 
-class Browser:
-    """Owns a connection, and opens it again when it ends, as the EventSource of a browser does."""
+class Page:
+    """Asks for what is new, and for everything after a question that was not answered, as the page does."""
 
     def __init__(self, port: int) -> None:
-        self.connections = 0
         self._port = port
-        self._response: HTTPResponse | None = None
+        self._number = -1
 
-    def wait_for(self, *names: str) -> dict[str, Any]:
-        """Return the next message in which all of these are known."""
+    def wait_for(self, name: str) -> Any:
+        """Return the first answer's values of this name that are not empty."""
         deadline_s = time.monotonic() + LONGEST_S
         while time.monotonic() < deadline_s:
-            message = self.next_message()
-            if message is not None and all(message.get(name) for name in names):
-                return message
-        raise AssertionError(f"no message with {' and '.join(names)}")
-
-    def next_message(self) -> dict[str, Any] | None:
-        """Return None for an empty line, and where there is no connection."""
-        try:
-            line = self._connected().readline().decode()
-        except OSError:
-            line = ""
-        if not line:
-            self._response = None
+            if found := self.ask().get(name):
+                return found
             time.sleep(RETRY_S)
-        return dict(json.loads(line.removeprefix("data: "))) if line.startswith("data: ") else None
+        raise AssertionError(f"no answer with {name}")
 
-    def _connected(self) -> HTTPResponse:
-        if self._response is None:
-            connection = HTTPConnection(ADDRESS, self._port, timeout=LONGEST_S)
-            connection.request("GET", "/rows")
-            self._response = connection.getresponse()
-            self.connections += 1
-        return self._response
+    def ask(self) -> dict[str, Any]:
+        """Return an answer; nothing where there is no server."""
+        connection = HTTPConnection(ADDRESS, self._port, timeout=LONGEST_S)
+        try:
+            connection.request("GET", f"/rows?after={self._number}")
+            answer = dict(json.loads(connection.getresponse().read()))
+        except OSError:
+            answer = {"number": -1}
+        connection.close()
+        self._number = answer["number"]
+        return answer
 
 
 @contextmanager
@@ -73,34 +65,33 @@ def serving(bench: Bench, port: int = 0) -> Iterator[int]:
 
 def test_a_page_that_stays_open_shows_the_daemon_that_was_started_again(own_bench: Bench) -> None:
     with serving(own_bench) as port:
-        browser = Browser(port)
-        before = browser.wait_for("tick")["tick"]
+        page = Page(port)
+        before = page.wait_for("ticks")[-1]
         own_bench.stop_daemon()
         own_bench.restart_daemon()
-        assert browser.wait_for("robot")["robot"]["flippers"] == ["left", "right"]
-        after = browser.wait_for("tick")["tick"]
-        assert (browser.connections, after["stamp_s"] > before["stamp_s"]) == (1, True)
+        assert page.wait_for("robot")["flippers"] == ["left", "right"]
+        assert page.wait_for("ticks")[-1]["stamp_s"] > before["stamp_s"]
 
 
-def test_a_page_reconnects_to_the_program_that_was_started_again(own_bench: Bench) -> None:
+def test_a_page_asks_the_program_that_was_started_again(own_bench: Bench) -> None:
     with serving(own_bench) as port:
-        browser = Browser(port)
-        before = browser.wait_for("tick")["tick"]
+        page = Page(port)
+        before = page.wait_for("ticks")[-1]
+    assert page.ask() == {"number": -1}
     with serving(own_bench, port):
-        after = browser.wait_for("tick")["tick"]
-        assert (browser.connections, after["tick"] > before["tick"]) == (2, True)
+        assert page.wait_for("ticks")[-1]["tick"] > before["tick"]
 
 
 def test_a_page_continues_after_both_were_stopped_and_the_program_started_first(own_bench: Bench) -> None:
     """Until a daemon answers, the program knows no robot, and the page keeps the one that it draws."""
     with serving(own_bench) as port:
-        browser = Browser(port)
-        before = browser.wait_for("tick")["tick"]
+        page = Page(port)
+        before = page.wait_for("ticks")[-1]
         own_bench.stop_daemon()
+    assert page.ask() == {"number": -1}
     with serving(own_bench, port):
-        while (first := browser.next_message()) is None or browser.connections == 1:
-            continue
-        assert ("robot" in first, first["tick"]) == (False, None)
+        first = page.ask()
+        assert (first["robot"], first["ticks"]) == ({}, [])
         own_bench.restart_daemon()
-        assert browser.wait_for("robot")["robot"]["name"]
-        assert browser.wait_for("tick")["tick"]["stamp_s"] > before["stamp_s"]
+        assert page.wait_for("robot")["name"]
+        assert page.wait_for("ticks")[-1]["stamp_s"] > before["stamp_s"]

@@ -11,6 +11,7 @@ from control.faults import FaultKind
 from control.modes import Mode
 from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import LONGEST_TEXT
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
@@ -141,16 +142,18 @@ def test_a_described_walk_is_a_trial_and_so_is_the_walk_after_it(armed: Robot) -
 
 @pytest.mark.parametrize("method", ["note", "mark"])
 def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None:
-    answer = robot.ask(method, text="clap: now")
+    text = "clap: 👏" + 893 * "𓆣"  # the longest
+    answer = robot.ask(method, text=text)
+    assert len(robot.events.texts[-1].encode()) < LONGEST_TEXT
     report = read_report(robot.events.texts[-1])
-    assert report and report.text == "clap: now" and report.time.timestamp() == WALL_S
+    assert report and report.text == text and report.time.timestamp() == WALL_S
     assert answer == {"stamp_s": robot.steps.now_s, "time": report.time.isoformat(timespec="microseconds")}
 
 
 @pytest.mark.parametrize(
     ("method", "params", "reason"),
     [
-        ("note", {"text": "x" * 1001}, "text"),
+        ("note", {"text": "x" * 901}, "text"),
         ("note", {"text": "a\nb"}, "text"),
         ("note", {"text": "\x1b[2J"}, "text"),
         ("mark", {"text": 3}, "text"),
