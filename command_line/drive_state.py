@@ -2,6 +2,7 @@
 
 from typing import Any
 
+POWER_CUT = "power cut"
 STALE_S = 0.1  # a drive sends position and current every 2 ms
 HEARTBEAT_STALE_S = 0.6  # and a heartbeat every 100 ms; after 0.5 s without it is a fault
 
@@ -9,6 +10,11 @@ HEARTBEAT_STALE_S = 0.6  # and a heartbeat every 100 ms; after 0.5 s without it 
 def is_stale(drive: dict[str, Any]) -> bool:
     age_s = drive["angle_age_s"]
     return age_s is None or age_s > STALE_S
+
+
+def mode_word(report: dict[str, Any]) -> str:
+    """Return the mode of the robot, or that its motors have no power."""
+    return POWER_CUT if report["power_cut"] else str(report["mode"])
 
 
 def supply_text(report: dict[str, Any]) -> str:

@@ -21,6 +21,9 @@ from simulation.harness.local_setup import configuration_text, local_copy, make_
 from simulation.harness.world import load_world
 from simulation.mud.clay import MUDS
 
+RESET = signal.SIGUSR1, "moved back; 'mudskipper clear' clears the fault"
+EMERGENCY_STOP = signal.SIGUSR2, "pressed, or released if it was pressed; 'mudskipper status' says which"
+
 
 def simulate(
     *,
@@ -28,6 +31,9 @@ def simulate(
     config: Annotated[Path | None, Option("the robot of this configuration, on its buses")] = None,
     local: Annotated[bool, Option("with --config: on local buses, whatever its interfaces are")] = False,
     reset: Annotated[bool, Option("move the joints of the robot that is simulated back into their range")] = False,
+    emergency_stop: Annotated[
+        bool, Option("press the emergency stop of the robot that is simulated, or release it")
+    ] = False,
     mud: Annotated[
         tuple[str, ...],
         Option("water content: 48.5, 53.1, 45.3", metavar="W", choices=tuple(MUDS), alternative="ground"),
@@ -42,8 +48,9 @@ def simulate(
         folder = named_folder(bus)
     except ValueError as problem:
         raise usage_error(f"--bus {problem}") from None
-    if reset:
-        return _reset(config if config and not local else folder / "mudskipper.toml")
+    if reset or emergency_stop:
+        number, answer = RESET if reset else EMERGENCY_STOP
+        return _signal(number, answer, config if config and not local else folder / "mudskipper.toml")
     if world:
         complain(*load_world(world).warnings)  # before anything is made; the peer reads it again
     ground = peer.Ground(waters=mud, world=world, on_blocks=on_blocks)
@@ -73,14 +80,16 @@ def _announce(path: Path, configuration: Configuration, named: str) -> None:
     print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
     print(f"  export MUDSKIPPER_SOCKET={configuration.status.socket}; {programs}/mudskipper status")
     reset = f"mudskipper simulate --reset {named}".rstrip()
-    print(f"'{reset}' moves joints back that lie beyond their limits.", flush=True)
+    print(f"'{reset}' moves joints back that lie beyond their limits.")
+    stop = f"mudskipper simulate --emergency-stop {named}".rstrip()
+    print(f"'{stop}' presses the emergency stop, and again to release it.", flush=True)
 
 
-def _reset(path: Path) -> int:
+def _signal(number: signal.Signals, answer: str, path: Path) -> int:
     """Signal the process that simulates the robot of this configuration; the lock of its buses names it."""
     for bus in parse_configuration(read_text(path), path).bus.values():
         if pid := bus_owner(BusRole.DRIVES, bus.interface, bus.channel):
-            os.kill(pid, signal.SIGUSR1)
-            print("moved back; 'mudskipper clear' clears the fault")
+            os.kill(pid, number)
+            print(answer)
             return exit_codes.OK
     raise CommandError(f"no robot is simulated on the buses of {path}: 'mudskipper simulate' makes one")

@@ -223,6 +223,13 @@ class FaultKind(StrEnum):
         "arming_failed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 765,
         "A drive did not go into closed loop.", "{subject} did not go into closed loop within {longest_s:g} s.", FIX,
     )
+    # the power of the motors
+    POWER_CUT = (
+        "power_cut", "power", DRIVES_IDLE, ALWAYS, BY_HAND, 45,
+        "The motors' power was cut, as by the emergency stop.", "The motors' power was cut",
+        "release the emergency stop once it is safe, or look at supply and bus cable; then 'mudskipper clear', and"
+        " 'mudskipper arm'", True,
+    )
     # buses
     BUS_WARNING = (
         "bus_warning", "bus", WARN, NO, WHEN_GONE, 2,

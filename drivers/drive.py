@@ -101,6 +101,7 @@ class DriveHealth(NamedTuple):
     setting_problem: str = ""  # a setting that was read back differs from the configuration: which, and what to do
     other_protocol: str = ""  # in which another drive answers under this id
     busy_state: str = ""  # an activity that this program did not ask for, such as a calibration
+    power_cut: bool = False  # an active error is an emergency stop, or a supply that is too low
     active_errors: str = ""
     errors: str = ""  # active errors and the reason of the last disarming
 

@@ -46,6 +46,7 @@ class GateTable(NamedTuple):
     always: Mapping[int, frozenset[bytes]]
     while_open: Mapping[int, frozenset[bytes]] = {}
     checks: Mapping[int, Callable[[bytes], bool]] = {}  # return whether a payload may leave that no set can list
+    questions: frozenset[bytes] = frozenset()  # of those that may always leave under the torque's id: no command
     requests: frozenset[Frame] = frozenset()  # remote frames that may always leave
     kind: FrameKind = FrameKind()
     idle: bytes = b""  # replaces a torque while the gate is closed, where even zero torque ends a drive's idleness
@@ -143,7 +144,8 @@ class GatedPort:
                 if not passes:
                     self._send_torque(frame, self._tables[identifier])
                     return
-                self._sent_nm[identifier] = 0.0  # another command of the same id, after which no torque is known
+                if data not in self._tables[identifier].questions:
+                    self._sent_nm[identifier] = 0.0  # another command of the same id, after which no torque is known
         if passes:
             self._port.send(frame)
         else:

@@ -26,6 +26,7 @@ from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures
 from drivers.pose.pose_port import OpenedPose, PoseSource, PoseSourceError
+from drivers.power_switch import PowerSwitchError, open_power_switch
 from firmware_host.buses import BusError, lock_buses, reopening_ports
 from firmware_host.computer.awake_processors import AwakeProcessors
 from firmware_host.computer.realtime import prepare_loop
@@ -123,7 +124,7 @@ def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | Nu
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
     """Run the loop until the shutdown is complete; return the exit status.
 
-    Raises BusError, PoseSourceError, AlreadyServedError or OSError before the first tick.
+    Raises BusError, PoseSourceError, PowerSwitchError, AlreadyServedError or OSError before the first tick.
     """
     with ExitStack() as stack:
         # The socket comes first, since it detects another daemon.
@@ -135,6 +136,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         ports = failing_ports(buses, configuration.drive, failures)
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         stack.callback(drives.close)
+        power_switch = open_power_switch(configuration.emergency_stop)
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
         recorder: Recording = open_recorder(configuration, rights)
@@ -144,7 +146,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
             recorder = FailingRecorder(recorder, failures)
             seen_pose, wall_clock = FailingPose(pose, failures), FailingClock(time.time, failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
-        loop = Loop(configuration, drives, seen_pose, recorder, wall_clock=wall_clock)
+        loop = Loop(configuration, drives, seen_pose, recorder, wall_clock=wall_clock, power_switch=power_switch)
         warnings = status.warnings
         defaults = load_defaults(Path(configuration.log.directory)) if configuration.log.enabled else {}
         calls = OperatorCalls(loop, warnings, time.monotonic, wall_clock, defaults)
@@ -261,7 +263,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, shutdown.request)
     try:
         return run(configuration, rights, shutdown)
-    except (BusError, PoseSourceError, AlreadyServedError) as problem:
+    except (BusError, PoseSourceError, PowerSwitchError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
         path = f" {problem.filename}" if problem.filename else ""

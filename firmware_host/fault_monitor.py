@@ -35,6 +35,7 @@ from firmware_host.ticker import Tick
 
 LATE_S = 0.1  # beyond it, a computer without real time: a simulated robot next to other programs
 STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
+CUT_S = 0.1  # of the silence of all drives, which began within this time: the motors' power is cut
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
 REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command
 BUS_TROUBLE_S = 2.0  # how long a bus warning outlasts the last error frame
@@ -65,6 +66,7 @@ class MonitorInput(NamedTuple):
     wall_minus_monotonic_s: float
     log: LogReport
     lost_lease_holder: str  # the program that has lost the lease; empty: none
+    power_cut: str = ""  # why the motors' power counts as cut, by its input; empty: it does not
     targets: JointTargets | None = None  # of the joints in the tick before; None without stiffness
     phase: Phase = Phase.REST  # of the gait in the tick before
     stride: int = -1  # of the walk in the tick before
@@ -100,6 +102,8 @@ class FaultMonitor:
         self._lagging_strides = dict.fromkeys(joints, (-9, -9))  # the last two in which a joint lagged in its swing
         self._sound: dict[str, DriveHealth | None] = dict.fromkeys(joints)  # the last report in which nothing was wrong
         self._pose_stamp_s: float | None = None
+        self._asks_drives = configuration.emergency_stop.source == "drives"
+        self.power_cut = ""  # why the motors' power counts as cut in this tick
         self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
         self.trusted: Joints[bool] = self._all_trusted  # of the joints' encoders
 
@@ -123,12 +127,17 @@ class FaultMonitor:
         found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
         found += self._log.update(monitor_input.log)
         self._check_buses(found, tick.now_s)
+        self.power_cut = monitor_input.power_cut
+        if self.power_cut:
+            found.append(FaultKind.POWER_CUT.fault(reason=self.power_cut))
         if monitor_input.lost_lease_holder:
             found.append(FaultKind.LEASE_LOST.fault(holder=monitor_input.lost_lease_holder))
         if monitor_input.mode is Mode.BOOT and not self._drives.heard:
             return found
         health = self._drives.health
         self._check_joints(found, tick, monitor_input, health)
+        if not self.power_cut:
+            self._check_power(found, health)
         sent_nm = monitor_input.sent.torques_nm
         self._gains.update(found, tick.missed == 0, monitor_input.states, sent_nm, monitor_input.phase)
         self._check_trust(found, monitor_input.mode)
@@ -160,6 +169,20 @@ class FaultMonitor:
             self._refused_ticks[name] = ticks = self._refused_ticks[name] + 1 if refused else 0
             if ticks >= REFUSED_TICKS:
                 found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=port.last_send_error))
+
+    def _check_power(self, found: list[Fault], drives: Joints[DriveHealth]) -> None:
+        """Find a cut of the motors' power: a drive reports it, or all drives of all buses fall silent at once."""
+        if self._asks_drives:
+            cut = [health for health in drives if health.power_cut]
+            self.power_cut = f"the {cut[0].joint} drive reports {cut[0].active_errors}" if cut else ""
+        silent_s = [float(dict(each.values)["age_s"]) for each in found if each.kind is FaultKind.DRIVE_SILENT]
+        at_once = len(silent_s) == len(self.joints) and CUT_S < max(silent_s) < min(silent_s) + CUT_S
+        if at_once and all(port.state is not BusState.OFF for port in self._drives.ports.values()):
+            self.power_cut = "all drives fell silent at once"
+        if self.power_cut:
+            found.insert(
+                0, FaultKind.POWER_CUT.fault(reason=self.power_cut)
+            )  # of one reaction the first fault is shown
 
     def _check_joints(
         self, found: list[Fault], tick: Tick, monitor_input: MonitorInput, drives: Joints[DriveHealth]

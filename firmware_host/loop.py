@@ -21,6 +21,7 @@ from control.rate import PERIOD_S
 from control.records import NEVER_S, BodyPose, DriveState, DriveStates, GaitTarget, Torques, same_for_all
 from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSource
+from drivers.power_switch import PowerSwitch
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.lease import Lease
@@ -45,11 +46,13 @@ class Loop:
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
         period_s: float = PERIOD_S,
+        power_switch: PowerSwitch | None = None,
     ) -> None:
         self.period_s = period_s
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
+        self.power_switch = power_switch
         self.recorder = recorder
         self.lease = Lease()
         self.events = LoopEvents(recorder, configuration.motion.longest_hold_s, configuration.bus_of)
@@ -127,7 +130,11 @@ class Loop:
 
     def _examine(self, tick: Tick, lost_lease_holder: str) -> Health:
         """Detect and latch faults, and collect the facts that the mode depends on."""
-        present = self.fault_monitor.update(tick, self._monitor_input(lost_lease_holder)) + self.learning.pop_faults()
+        was_cut = self.fault_monitor.power_cut
+        present = self.fault_monitor.update(tick, self._monitor_input(tick, lost_lease_holder))
+        present += self.learning.pop_faults()
+        if was_cut and not self.fault_monitor.power_cut:
+            self.events.report(tick.now_s, "the motors' power is back")
         if self.controller.fault:
             present.append(self.controller.fault)
         clearing = tick.now_s <= self._clearing_until_s
@@ -145,7 +152,7 @@ class Loop:
             blocking=tuple(self.faults.blocking(self.forced)),
         )
 
-    def _monitor_input(self, lost_lease_holder: str) -> MonitorInput:
+    def _monitor_input(self, tick: Tick, lost_lease_holder: str) -> MonitorInput:
         return MonitorInput(
             mode=self.mode,
             mode_since_s=self._mode_since_s,
@@ -156,6 +163,7 @@ class Loop:
             wall_minus_monotonic_s=self._wall_clock() - self._clock(),
             log=self.recorder.report(),
             lost_lease_holder=lost_lease_holder,
+            power_cut=self.power_switch.update(tick.now_s) if self.power_switch else "",
             targets=self.controller.followed_targets,
             phase=self.target.phase,
             stride=self.target.stride,
@@ -243,6 +251,7 @@ class Loop:
             body=self.body,
             missed_ticks=self.missed_ticks,
             mode=self.mode,
+            power_cut=self.fault_monitor.power_cut != "",
         )
         self.recorder.put(TICK_KIND, row)
         if self.controller.recovery.events:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.drive_state import supply_text, torque_state
+from command_line.drive_state import POWER_CUT, mode_word, supply_text, torque_state
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
@@ -32,7 +32,15 @@ WAITING_S = 30.0
 BEYOND_RANGE = "joint_position"  # a fault
 LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
-MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
+MODE_COLOURS = {
+    "fault": RED,
+    "damping": RED,
+    POWER_CUT: RED,
+    "walking": GREEN,
+    "hold": GREEN,
+    "stopping": YELLOW,
+    "arming": YELLOW,
+}
 
 
 TakeOver: TypeAlias = Annotated[bool, Option("take the lease from a program that holds it")]
@@ -265,7 +273,7 @@ def _check_text(item: dict[str, Any], following: list[str]) -> str:
 
 
 def status_text(report: dict[str, Any]) -> str:
-    mode = coloured(report["mode"], MODE_COLOURS.get(report["mode"], BOLD))
+    mode = coloured(mode_word(report), MODE_COLOURS.get(mode_word(report), BOLD))
     stride = "no stride" if report["stride"] < 0 else f"stride {report['stride']}"
     lines = [f"{report['robot']}: {mode}, {stride}, {report['phase']}"]
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
@@ -351,6 +359,16 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"pose   {poses if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
             + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")
-            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else ""),
+            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else "")
+            + _quota_line(log),
         )
     )
+
+
+def _quota_line(log: dict[str, Any]) -> str:
+    """Return what the quota deletes; empty where there is no log or the daemon is older."""
+    if not log["path"] or "quota_bytes" not in log:
+        return ""
+    from firmware_host.log.log_folder import quota_text  # not needed by the other commands
+
+    return f"\nquota  {quota_text(Path(log['path']).parent.parent, log['quota_bytes'], log['min_free_fraction'])}"

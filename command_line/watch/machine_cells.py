@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.text import Text
 
-from command_line.drive_state import is_stale, supply_text, torque_state
+from command_line.drive_state import POWER_CUT, is_stale, mode_word, supply_text, torque_state
 from command_line.operation.attended_walk import MILD
 from command_line.screen import clock_text
 from command_line.watch.history import History
@@ -15,7 +15,7 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
 
 BADGES = {
-    **dict.fromkeys(("fault", "damping", "no answer"), "bold white on red"),
+    **dict.fromkeys(("fault", "damping", "no answer", POWER_CUT), "bold white on red"),
     **dict.fromkeys(("stopping", "arming"), "bold black on yellow"),
     **dict.fromkeys(("walking", "hold"), "bold black on green"),
 }
@@ -46,7 +46,7 @@ def alarm_text(history: History, now_s: float) -> Text:
         text = (f"Nothing heard from the daemon {since}: torque unknown.", BAD)
         advice = [f"-> the values below are old; {history.problem or 'the daemon hangs'}."]
     elif causes:
-        mode, cause = report["mode"], causes[0]
+        mode, cause = mode_word(report), causes[0]
         following = len(cause["consequences"])
         consequence = f" {counted(following, 'fault')} as its consequence." if following else ""
         style = WARNING if cause["reaction"] in MILD else BAD

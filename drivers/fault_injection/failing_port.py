@@ -25,6 +25,7 @@ from drivers.fault_injection.failure_table import FailureKind
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, Failures
 
 NO_NODE = -1
+SUPPLY = "supply"  # of all drives
 FAR_TURNS = 2.0  # random values that look plausible
 MOST_RANDOM_FRAMES = 3  # in one read of a bus full of garbage
 SILENT = (FailureKind.OFF, FailureKind.BUS_OFF)
@@ -141,7 +142,7 @@ class FailingPort:
         joint = self._joints.get(content.node_id) if content else None
         if content is None or joint is None:
             return (self._bus,), None
-        return (self._bus, joint, *(f"{joint}.{signal}" for signal in content.signals)), content
+        return (self._bus, SUPPLY, joint, *(f"{joint}.{signal}" for signal in content.signals)), content
 
     def _content(self, frame: Frame) -> FrameContent | None:
         return read_frame(frame, self._drives.values())

@@ -331,6 +331,12 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
            act=("gains_changed", TOO_STIFF)),
     *_rows("flipper", "stuck", "", expects("flipper_stuck", phases=("recovery",)), act=("recovery_given_up",)),
 
+    # the power of the motors
+    *_rows("supply", "off", "no frame arrives from any drive, as if the emergency stop cut their power; commands reach"
+           " them", expects("power_cut", 1.0, PHASES)),
+    *_rows("supply", "cut", "", expects("power_cut", 1.0, PHASES, how="the drives restart"), act=("supply_cut",),
+           loses_commands=True),
+
     # buses
     *_rows("bus.NAME", "off", "the interface is gone: no frame arrives, sending fails"),
     *_rows("bus.NAME", "stuck", "the transmit queue is full: sending fails", expects("bus_refuses"),
@@ -410,6 +416,7 @@ IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")  # faults of a 
 CONSEQUENCES: Mapping[str, tuple[str, ...]] = {  # faults that may be reported with a fault, because they are true too
     "drive_quiet": ("drive_late", "position_stale", "current_stale"),
     "drive_silent": (*ABSENT_DRIVE, "zero_shifted"),  # of a joint that fell meanwhile
+    "power_cut": (*ABSENT_DRIVE, "drive_quiet", "drive_disarmed", "torque_missing", "zero_shifted"),
     "position_stale": ("drive_late",),
     "position_silent": ("drive_late", "position_stale", "zero_shifted"),
     "current_stale": ("drive_late",),

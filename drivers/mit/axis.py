@@ -141,6 +141,7 @@ class MitAxis(AnsweringAxis):
             ._replace(
                 supported_firmware="one that answers the reading of register 14",
                 watchdog_advice=self.settings.watchdog_advice,
+                power_cut=self._error_flags in codec.UNDER_VOLTAGES,
                 watchdog_expired=self._error_flags == codec.LOST_COMMANDS,
                 active_errors=errors,
                 errors=errors,

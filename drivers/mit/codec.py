@@ -35,6 +35,7 @@ STATE = 0xCC  # asks for an answer without a command
 _REGISTER_FRAME = Struct("<HBB4s")
 
 DISABLED, ENABLED, LOST_COMMANDS = 0x0, 0x1, 0xD  # a Damiao's status
+UNDER_VOLTAGES = (0x4, 0x9)  # of a CubeMars and of a Damiao
 FAULT_NAMES = {
     1: "over-temperature",
     2: "over-current",

@@ -143,6 +143,7 @@ class MoteusAxis(AnsweringAxis):
             ._replace(
                 supported_firmware=f"one with register map {REGISTER_MAP}",
                 watchdog_advice="the drive did not answer on its console: is another program connected to it?",
+                power_cut=self._error_flags == codec.UNDER_VOLTAGE,
                 watchdog_expired=self._reason == codec.TIMEOUT_FLAG,
                 busy_state="" if self._mode in QUIET_MODES else f"mode {self._mode}",
                 active_errors=codec.error_text(self._error_flags),

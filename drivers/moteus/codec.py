@@ -52,6 +52,7 @@ ABSENT = -128  # an int8 that the drive does not know
 VOLTAGE_V, TORQUE_NM = 0.5, 0.01  # of the smallest step
 UNKNOWN_FAULT = 0xFF  # a drive that reports the mode FAULT without a code
 TIMEOUT_FLAG = 0x100  # this program's own number for the mode TIMEOUT, next to the drive's fault codes
+UNDER_VOLTAGE = 40
 
 FAULT_NAMES = {
     32: "calibration fault",
@@ -62,7 +63,7 @@ FAULT_NAMES = {
     37: "PWM cycle overrun",
     38: "over-temperature",
     39: "started outside of servopos.position_min and position_max",
-    40: "under-voltage",
+    UNDER_VOLTAGE: "under-voltage",
     41: "configuration changed",
     42: "commutation angle invalid",
     43: "position invalid",

@@ -22,6 +22,7 @@ def gate_table(drive: MoteusParameters) -> GateTable:
         zero_torque=codec.encode_torque(0.0),
         decode_torque=codec.decode_torque,
         always={identifier: frozenset(QUERIES)},
+        questions=frozenset({codec.POWER_QUERY}),
         kind=KIND,
         idle=codec.QUERY_ALONE,
     )

@@ -72,6 +72,7 @@ class OdriveAxis(CanSimpleAxis):
             hardware=settings.hardware,
             watchdog_s=settings.watchdog_s,
             watchdog_advice=f"name the parameter numbers of firmware {settings.hardware} in [[watchdog_endpoints]]",
+            power_cut=bool(self._error_flags & codec.POWER_CUT),
             watchdog_expired=bool(flags & codec.ERROR_WATCHDOG),
             serial_number=settings.serial_number,
             expected_serial_number=settings.expected_serial_number,

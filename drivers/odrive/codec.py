@@ -77,8 +77,10 @@ SDO_HEAD_BYTES = 4
 
 # Flags of active errors and disarm reasons (odrive.enums.ODriveError).
 ERROR_INITIALIZING = 0x1
+ERROR_UNDER_VOLTAGE = 0x200
 ERROR_WATCHDOG = 0x1000000
 ERROR_ESTOP = 0x2000000
+POWER_CUT = ERROR_ESTOP | ERROR_UNDER_VOLTAGE
 
 ERROR_NAMES = {
     ERROR_INITIALIZING: "initializing",
@@ -89,7 +91,7 @@ ERROR_NAMES = {
     0x20: "gate driver fault",
     0x40: "missing input",
     0x100: "bus over-voltage",
-    0x200: "bus under-voltage",
+    ERROR_UNDER_VOLTAGE: "bus under-voltage",
     0x400: "bus over-current",
     0x800: "bus over-regeneration",
     0x1000: "current limit violation",

@@ -153,6 +153,7 @@ class Odrive05Axis(CanSimpleAxis):
             firmware_supported=self._counts_known and version is None,
             watchdog_s=self._proof.watchdog_s,
             watchdog_advice="clear the drive's errors, let no other program send to it, and wait for a second",
+            power_cut=bool(self._error_flags & codec.ERROR_ESTOP),
             watchdog_expired=bool(self._error_flags & codec.ERROR_WATCHDOG),
             setting_problem=self._counts_problem,
             active_errors=errors,

@@ -28,6 +28,7 @@ from drivers.drive import DriveParameters, WatchdogEndpoints
 from drivers.fault_injection.failures import FailureParameters
 from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
+from drivers.power_switch import EmergencyStopParameters
 from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
 from firmware_host.configuration.log_parameters import LogParameters
@@ -139,6 +140,7 @@ class Configuration:
     log: LogParameters = LogParameters()
     status: StatusParameters = StatusParameters()
     pose: PoseParameters = PoseParameters()
+    emergency_stop: EmergencyStopParameters = EmergencyStopParameters()
     failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of more firmware builds
     text: str = ""  # the file itself, which goes into every log

@@ -22,6 +22,7 @@ from control.joint_pd import (
 from control.parameters.gait_parameters import GaitParameters
 from control.plate_outline import outline_problems
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
+from drivers.power_switch import EmergencyStopParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.configuration.drive_consistency import bus_problems, drive_problems, rig_problems
 from firmware_host.configuration.toml_records import shown
@@ -46,6 +47,7 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _text_problems(configuration)
     yield from rig_problems(configuration)
     yield from _pose_problems(configuration.pose)
+    yield from _emergency_stop_problems(configuration.emergency_stop)
     yield from drive_problems(configuration)
     yield from bus_problems(configuration)
     yield from _plate_problems(configuration.geometry)
@@ -68,6 +70,13 @@ def gait_warnings(gait: GaitParameters) -> list[str]:
     values = f"gait.pause_s = {gait.pause_s:g} with gait.extraction_speed_m_s = {gait.extraction_speed_m_s:g}"
     reason = "right after a stance a slow extraction gives a k_e that is too small by more than its standard error"
     return [f'{values}: {reason}; pause for {LEAST_PAUSE_S:g} s or more, as gait.protocol = "measuring" does']
+
+
+def _emergency_stop_problems(stop: EmergencyStopParameters) -> Iterator[str]:
+    needed = {"gpio": ("device",), "key": ("device", "key")}.get(stop.source, ())
+    for key in needed:
+        if not getattr(stop, key):
+            yield f"emergency_stop.{key} = '': must be given for emergency_stop.source = {stop.source!r}"
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:

@@ -70,6 +70,7 @@ def tick_kind(rig: Rig) -> RowKind:
             _enumeration("mode", Mode),
             _enumeration("phase", Phase),
             Field("limited", "bool", "the limits cut a torque"),
+            Field("power_cut", "bool", "the motors' power is cut, as by the emergency stop"),
         ),
         metadata={"flippers": " ".join(rig.flippers), "joints": " ".join(rig.joints)},
     )
@@ -87,6 +88,7 @@ def tick_row(
     body: BodyPose,
     missed_ticks: int,
     mode: Mode,
+    power_cut: bool,
 ) -> bytes:
     """Pack the values of one tick, in the order of the table above."""
     now_s = tick.now_s
@@ -117,6 +119,7 @@ def tick_row(
         mode,
         target.phase,
         sent.limited,
+        power_cut,
     )
 
 

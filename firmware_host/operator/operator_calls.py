@@ -104,6 +104,7 @@ class OperatorCalls:
             "moving": loop.controller.moving,
             **self._fault_reports(),
             "forced": bool(loop.forced),
+            "power_cut": loop.fault_monitor.power_cut or None,
             "notice": loop.events.notice,
             "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,
@@ -330,6 +331,8 @@ def _log_report(loop: Loop, now_s: float) -> dict[str, Any]:
         "slowest_write_s": known(log.slowest_write_s),
         "durable_age_s": known(now_s - log.durable_stamp_s),
         "repairing": log.repairing,
+        "quota_bytes": loop.configuration.log.quota_bytes,
+        "min_free_fraction": loop.configuration.log.min_free_fraction,
     }
 
 

@@ -184,6 +184,7 @@ STATUS_KEYS = {
     "faults_left_out": f"number of present faults beyond the {FAULTS_PER_ANSWER} with the hardest reactions",
     "causes": "the faults grouped by cause: name, subjects, message, what_to_do, age_s, reaction, consequences",
     "forced": "whether the robot was armed by force against a present fault",
+    "power_cut": "why the motors' power counts as cut, or null",
     "notice": "why the robot stopped, until it is moved again",
     "notice_age_s": "time in s since it stopped, or nothing",
     "unlogged_requests": "number of requests since the start that changed nothing or were repeated",
@@ -199,6 +200,7 @@ STATUS_KEYS = {
     "pose": "source of the body's position and its state",
     "drives": "every drive, in the order of the joints: signals, their ages in s, error text, firmware and watchdog",
     "strides_closed": "number of strides of single flippers since the start",
+    "stride_supply_min_v": "lowest voltage of any drive in the last stride in V, or null",
     "mud": "the current estimate of the mud's coefficients in N/m³, of both flippers and of each",
     "loads": "the mud's load on each flipper: torques in N·m, forces in N, depth in m",
     "loop": "rate in Hz, ticks, missed ticks, and percentiles of wake-up delay and tick duration in µs;"

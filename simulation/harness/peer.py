@@ -3,7 +3,7 @@
 It takes from the configuration what a real robot's bench fixes: buses, node ids, signs, geometry, a fixed base. It
 sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who
 moves the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
-`mudskipper simulate --reset` sends it.
+`mudskipper simulate --reset` sends it, and with `--emergency-stop` SIGUSR2, which cuts the drives' power.
 """
 
 import argparse
@@ -138,6 +138,7 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
+    signal.signal(signal.SIGUSR2, lambda number, frame: peer.robot.turn_emergency_stop())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
     take_precedence()

@@ -47,6 +47,7 @@ class SimulatedRobot:
         self.observers: list[Callable[[float, Torques], None]] = []  # of each step's length and the motors' torques
         self.foreign_masters: list[ForeignMaster] = []  # other programs that command the drives
         self._put_back_requested = False
+        self.powered = True  # False: the emergency stop is pressed
         for drive in self.drives:
             drive.reset(start_s)
         self._measure()
@@ -58,6 +59,8 @@ class SimulatedRobot:
             self._put_back_requested = False
             for arm in self.plant.arms:
                 arm.put_back()
+        for drive in () if self.powered else self.drives:
+            drive.restart(self.now_s)  # it boots once the power is back
         wires = tuple(zip(self.drives, self._port_of_drive, strict=True))
         while self.now_s + STEP_S <= until_s:
             self.now_s = now_s = self.now_s + STEP_S
@@ -73,6 +76,10 @@ class SimulatedRobot:
     def request_put_back(self) -> None:
         """Put the flippers back as an operator does by hand, before the next step: safe in a signal handler."""
         self._put_back_requested = True
+
+    def turn_emergency_stop(self) -> None:
+        """Press the emergency stop, which cuts the power of all drives, or release it: safe in a signal handler."""
+        self.powered = not self.powered
 
     def restart_drive(self, joint: int) -> None:
         """Interrupt the supply of one drive for a moment. `joint`: its index in the rig's joints."""

@@ -94,27 +94,35 @@ def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers
     assert plant.angles_rad == pytest.approx((0.0, RESTING_RAD, 0.0, RESTING_RAD))
 
 
-def test_a_reset_moves_the_flippers_back_as_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_operator_moves_the_flippers_back_and_presses_the_emergency_stop(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class HandedPeer(peer.Peer):
         """A simulated robot with its joints at their stops; it runs for one step."""
 
         def run(self) -> None:
             for arm in self.robot.plant.arms:
                 arm.sweep_rad, arm.adduction_rad = END_STOPS_RAD
-            assert main(["simulate", "--reset", "--config", str(short_folder / "mudskipper.toml")]) == exit_codes.OK
+            for option in ("--reset", "--emergency-stop"):
+                assert main(["simulate", option, "--config", str(short_folder / "mudskipper.toml")]) == exit_codes.OK
             self._pose.step = lambda now_s, plant: self.end(0, None)  # type: ignore[method-assign]
             super().run()
+            powered.append(self.robot.powered)
             lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
 
     lying: list[tuple[float, float]] = []
+    powered: list[bool] = []
     monkeypatch.setattr(peer, "take_precedence", lambda: None)
     monkeypatch.setattr(peer, "Peer", HandedPeer)
-    before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)}
+    before = {
+        number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGTERM, signal.SIGINT)
+    }
     try:
         assert main(["simulate", "--config", str(write_local_setup(short_folder, short_folder))]) == exit_codes.OK
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+    assert powered == [False]
     assert len(lying) == 2 and all(abs(sweep) < 0.05 and abs(adduction) < 0.5 for sweep, adduction in lying)
 
 

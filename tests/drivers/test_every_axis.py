@@ -64,3 +64,17 @@ def test_the_supply_of_every_drive_is_known_also_of_one_that_reports_it_only_whe
         for value, expected in zip(seen, SUPPLIES[name], strict=True):
             assert isnan(value) if expected is None else value == pytest.approx(expected, rel=0.02)
     assert drives.drives.malformed_frames == 0
+
+
+@each_type
+def test_a_question_for_the_supply_leaves_the_torque_as_it_is(name: str) -> None:
+    """The gate compares the next torque with the one before the question."""
+    drives = DrivenDrives(name)
+    drives.arm()
+    drives.tick(0.5)
+    for axis in drives.drives.axes:
+        axis.request_supply()
+    drives.drives.send((0.5,) * 4, 0.0)  # type: ignore[arg-type]
+    assert drives.drives.refused_commands == 0
+    drives.exchange()
+    assert drives.torque_nm() > 0.4

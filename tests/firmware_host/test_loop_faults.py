@@ -14,12 +14,15 @@ from typing import Any
 import pytest
 
 from control.controller import SOFT_STOP_S, WalkOrder
+from control.fault_causes import group_by_cause
 from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import Phase
 from drivers.fault_injection.failure_table import BY_NAME
+from drivers.power_switch import EmergencyStopParameters, PowerSwitch
 from firmware_host.configuration.configuration import Configuration
+from simulation.devices.drive import DriveError
 from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
@@ -128,6 +131,76 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(at: 
     assert ticks[Mode.DAMPING] < ticks[Mode.FAULT] <= FaultKind.DRIVE_SILENT.bound_ticks
     assert robot.loop.sent.torques_nm == NO_TORQUE
     assert JOINT in robot.loop.events.notice and "stopped by drive_silent" in robot.loop.events.notice
+
+
+def after_release(robot: Robot) -> None:
+    """Once the power is back nothing moves until an operator clears and arms."""
+    robot.run_for(2.0)
+    assert mode_of(robot) in (Mode.FAULT, Mode.IDLE) and not any(drive.energised for drive in robot.robot.drives)
+    assert robot.loop.request(Request.ARM, robot.now_s) is not None
+    for zero in robot.loop.fault_monitor.zeros:  # of joints that fell meanwhile: `clear --zero`
+        zero.confirm()
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    robot.run_for(2.0)  # version and watchdog are read again in this time
+    assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.present
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
+    assert [text.partition(":")[0] for text in robot.recorder.about("power") if "mode " not in text] == [
+        "fault power_cut (drives_idle)",
+        "the motors' power is back",
+        "over",
+    ]
+
+
+@pytest.mark.parametrize("stage", ["idle", "holding", "stance", "stopping"])
+@pytest.mark.parametrize("failure", ["power_cut", "power_cut, the drives restart"])
+def test_all_drives_that_fall_silent_at_once_have_no_power(at: Copied, stage: str, failure: str) -> None:
+    robot = at(stage)
+    cut = fail(robot, failure)
+    ticks_until(robot, "power_cut", FaultKind.POWER_CUT.bound_ticks)
+    robot.run_for(1.0)
+    assert robot.loop.fault_monitor.power_cut
+    causes = group_by_cause(robot.loop.aged_faults, robot.loop.configuration.bus_of)
+    assert [cause.root.name for cause in causes] == ["power_cut"]
+    assert robot.loop.events.notice.startswith("stopped by power_cut: ") or stage == "idle"
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    robot.run_for(0.6)
+    assert "power_cut" in {fault.name for fault in robot.loop.faults.present}  # the cause is still there
+    end(cut)
+    after_release(robot)
+
+
+@pytest.mark.parametrize(("failing", "spread_s"), [(("bus.left",), 0.0), (("bus.left", "bus.right"), 0.3)])
+def test_one_bus_or_one_drive_after_the_other_is_no_cut_of_the_power(
+    at: Copied, failing: tuple[str, ...], spread_s: float
+) -> None:
+    robot = at("holding")
+    for component in failing:
+        robot.fail(component, "off", 3.0)
+        robot.run_for(spread_s)
+    robot.run_for(1.0)
+    names = {fault.name for fault in robot.loop.faults.present}
+    assert "drive_silent" in names and "power_cut" not in names
+
+
+@pytest.mark.parametrize("stage", ["holding", "stance"])
+def test_an_input_that_says_that_the_power_is_cut_idles_the_drives(at: Copied, stage: str) -> None:
+    robot, pressed = at(stage), [True]
+    robot.loop.power_switch = PowerSwitch(lambda: pressed[0], "line 17 of /dev/gpiochip0")
+    ticks_until(robot, "power_cut", 10)
+    assert mode_of(robot) is Mode.FAULT and "line 17" in robot.loop.events.notice
+    pressed[0] = False
+    after_release(robot)
+
+
+def test_a_drive_may_say_that_the_power_is_cut(configuration: Configuration) -> None:
+    robot = Robot(replace(configuration, emergency_stop=EmergencyStopParameters("drives")))
+    robot.run_for(2.0)
+    robot.arm()
+    robot.drive(JOINT).trip(DriveError.UNDERVOLTAGE)
+    ticks_until(robot, "power_cut", 50)
+    assert f"the {JOINT} drive reports bus under-voltage" in robot.loop.events.notice
+    after_release(robot)
 
 
 def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copied) -> None:

@@ -120,6 +120,14 @@ def restart_shifted(robot: FailingRobot, joint: str, shift_rad: float, boot_s: f
 
 
 @during
+def supply_cut(robot: FailingRobot, joint: str) -> Iterator[None]:
+    """Cut the power of all drives, which boot afterwards."""
+    robot.robot.powered = False
+    yield
+    robot.robot.powered = True
+
+
+@during
 def duplicate(robot: FailingRobot, joint: str, angle_rad: float) -> Iterator[None]:
     with robot.every_step(robot.add_duplicate(joint, angle_rad)):
         yield

@@ -83,6 +83,7 @@ MIT: Table = {
         *("drive_energised", "torque_missing", "damping_failed"),
     ),
     "encoder_stuck, at zero speed": NO_CLAMP,
+    "daemon_hung": _also(UNASKED, "voltage_silent"),
     "drive_error, by its watchdog": Difference(
         "a drive without commands sends no answer that could state the error",
         {"instead": ("drive_silent",), "component": "JOINT.command", "kind": "off", "act": ()},
@@ -147,7 +148,7 @@ NO_TEMPERATURE = "its messages have no temperature: the winding's is computed fr
 COUNTED = "before its first closed loop its position is asked for, and not while its watchdog is tried"
 LOST_COUNTS = _also(COUNTED, "drive_late", "position_stale", "position_silent")
 ODRIVE05: Table = {
-    **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown"), LOST_COUNTS),
+    **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown", "power_cut"), LOST_COUNTS),
     **dict.fromkeys(("bus_off", "bus_refuses", "daemon_hung"), LOST_COUNTS),
     "drive_error, by its watchdog": _also(
         f"{ZERO}, and no question reaches it", "drive_late", "position_stale", "position_silent"

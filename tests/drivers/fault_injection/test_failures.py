@@ -23,7 +23,7 @@ def test_every_kind_makes_sense_somewhere() -> None:
 def test_every_joint_its_parts_and_every_bus_can_fail(failures: Failures) -> None:
     parts = ("", ".position", ".current", ".heartbeat", ".temperature", ".voltage", ".error", ".command")
     joints = {f"{joint}{part}" for joint in JOINTS for part in parts}
-    assert set(failures.families) == joints | {"bus.left", "bus.right", "pose", "log", "loop", "clock"}
+    assert set(failures.families) == joints | {"bus.left", "bus.right", "supply", "pose", "log", "loop", "clock"}
 
 
 def test_the_table_shows_every_component_with_every_kind_that_is_accepted(failures: Failures) -> None:

@@ -133,6 +133,9 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
     (SOCKET, "x" * 120, [f"status.socket = '{'x' * 120}': must be at most 97 bytes"]),
     (SOCKET, "", ["status.socket = '': must name a socket"]),
+    ("[status]", '[emergency_stop]\nsource = "key"\n[status]', [
+        "emergency_stop.device = '': must be given", "emergency_stop.key = '': must be given"
+    ]),
     ("[status]", '[status]\nread_group = "a\\u0000b"', ["status.read_group: must be without a zero byte"]),
     ("[status]", '[status]\ndrive_group = "a\\u0000b"', ["status.drive_group: must be without a zero byte"]),
 ]  # fmt: skip

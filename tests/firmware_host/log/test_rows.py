@@ -56,6 +56,7 @@ def test_a_tick() -> None:
         body=BodyPose(x_m=16.0),
         missed_ticks=17,
         mode=Mode.WALKING,
+        power_cut=True,
     )
     assert tick_kind(RIG).decode(row) == {
         "stamp_s": 30.0,
@@ -84,6 +85,7 @@ def test_a_tick() -> None:
         "mode": Mode.WALKING,
         "phase": Phase.STANCE,
         "limited": True,
+        "power_cut": True,
     }
 
 

@@ -89,7 +89,7 @@ def test_a_push_ends_with_the_fault_that_the_protocol_shows_at_the_latest() -> N
 
 
 def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded() -> None:
-    cell = run_cell("voltage_under", "hold", 1, "mit:AK80-9")
+    cell = run_cell("motor_hot", "hold", 1, "odrive05")
     assert (cell.ok, cell.reported, cell.bound_ticks) == (True, [], None) and cell.energy_j <= cell.energy_bound_j
 
 
