@@ -28,6 +28,7 @@ LOGS: Mapping[str, Command] = {
     "open": ("viewers.open_log.open_log", "Open a log in a viewer, with the project's layout."),
     "annotate": ("logs.log_folder_commands.annotate_log", "Change the description of a log that is closed."),
     "list": ("logs.log_folder_commands.list_logs", "List the logs and the room that is left."),
+    "pull": ("logs.log_pull.pull", "Copy new logs from a robot over SSH, and mark them as copied."),
     "recover": ("logs.log_folder_commands.recover", "Repair logs whose writer was interrupted."),
 }
 COMMANDS: Mapping[str, Command] = {

@@ -26,6 +26,7 @@ SCHEMAS = {  # what prints it -> version
     "log-info": 2,
     "log-index": 1,
     "log-list": 1,
+    "log-pull": 1,
     "log-query": 1,
     "log-recover": 1,
     "log-report": 1,

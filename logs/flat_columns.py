@@ -68,4 +68,11 @@ def _columns_of(field: Field, values: NDArray[Any]) -> list[Column]:
         return [Column(field.name, unit, field.meaning, values, dict(enumerate(field.words)))]
     each = field.each or tuple(map(str, range(values.shape[1])))
     names = [f"{name}_{field.name}" if field.each else f"{field.name}_{name}" for name in each]
-    return [Column(name, unit, field.meaning, values[:, number], {}) for number, name in enumerate(names)]
+    everyone = ", ".join(name.replace("_", " ") for name in field.each)  # in the meaning of the whole array
+    meanings = [
+        field.meaning.replace(everyone, name.replace("_", " ")) if field.each else field.meaning for name in each
+    ]
+    return [
+        Column(name, unit, meaning, values[:, number], {})
+        for number, (name, meaning) in enumerate(zip(names, meanings, strict=True))
+    ]

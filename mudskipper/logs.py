@@ -33,6 +33,23 @@ class OpenedLog:
     missing_fields: tuple[str, ...]  # of an earlier version; they are NaN, 0, False or empty
     rig: Rig  # the flippers of the robot; `rig.joints` are the names of its joints
 
+    def __str__(self) -> str:
+        """Return what the log contains, in ten lines at most."""
+        known = "stamp_s" in (self.ticks.dtype.names or ()) and len(self.ticks)
+        rows = {
+            "files": ", ".join(path.name for path in self.paths[:3]) + ", ..." * (len(self.paths) > 3),
+            "robot": f"{self.metadata.get('robot', '?')}, {', '.join(self.rig.joints)}",
+            "started": f"{self.metadata.get('started', '?')}, mudskipper {self.metadata.get('version', '?')}",
+            "length": f"{self.ticks['stamp_s'][-1] - self.ticks['stamp_s'][0]:.1f} s" if known else "?",
+            "ticks": f"{len(self.ticks)} rows of {len(self.ticks.dtype.names or ())} fields",
+            "strides": f"{len(self.strides)} rows of {len(self.strides.dtype.names or ())} fields",
+            "events": f"{len(self.events)}, the last: {self.events['text'][-1] if len(self.events) else 'none'}"[:100],
+            "end": "whole" if self.complete else "cut off: everything before that is here",
+        }
+        return "\n".join(f"{name:8} {text}" for name, text in rows.items())
+
+    __repr__ = __str__
+
     @property
     def configuration(self) -> Configuration:
         """Return the configuration with which the daemon ran. Raises LogError where this version does not accept it."""

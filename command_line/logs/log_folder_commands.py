@@ -35,7 +35,7 @@ from logs.files.log_error import DAMAGE, LogError
 from logs.files.stored_logs import is_being_written, preserve, size_text, why_not_moved
 
 BEING_WRITTEN = "being written"
-SOUND = ("whole", "export", BEING_WRITTEN)
+SOUND = ("whole", "export", "copy", BEING_WRITTEN)
 
 LEGEND = (
     "unfinished: cut off; broken: damaged, or left by a recovery that did not end.\n"

@@ -82,7 +82,8 @@ def log_report(
     else:
         print(out / PAGE)
     print(f"written  {len(written)} files in {out}", file=sys.stderr)
-    return exit_codes.OK
+    whole = all(headline["complete"] for headline in headlines)
+    return exit_codes.OK if whole else exit_codes.UNHEALTHY
 
 
 def _layout(mud: Sequence[tuple[str, float]], world: Path | None) -> MudLayout | None:

@@ -359,6 +359,16 @@ def _loop_text(report: dict[str, Any]) -> str:
             f"pose   {poses if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
             + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")
-            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else ""),
+            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else "")
+            + _quota_line(log),
         )
     )
+
+
+def _quota_line(log: dict[str, Any]) -> str:
+    """Return what the quota deletes; empty where there is no log or the daemon is older."""
+    if not log["path"] or "quota_bytes" not in log:
+        return ""
+    from firmware_host.log.log_folder import quota_text  # not needed by the other commands
+
+    return f"\nquota  {quota_text(Path(log['path']).parent.parent, log['quota_bytes'], log['min_free_fraction'])}"

@@ -22,6 +22,7 @@ from experiments.run_report.results import (
     SPEED,
     Entry,
     differences,
+    end_sentences,
     flipper_difference,
     headline_sentences,
     is_shown,
@@ -116,10 +117,7 @@ def _table(section: str, rows: Sequence[Mapping[str, Any]], title: str = "") -> 
 
 
 def _result_text(run: Run, headline: Entry) -> str:
-    sentences = headline_sentences(run, headline)
-    if run.log and not run.log.complete:
-        sentences.append("The log was not finished: everything up to where it ends was read.")
-    paragraphs = [" ".join(sentences)]
+    paragraphs = [" ".join(headline_sentences(run, headline))]
     if headline["muds"]:
         uncertain = int((run.strides["mud"] == "").sum())
         border = f"Near a border or past the last mud, so in no mud: {counted(uncertain, 'stride')}."
@@ -328,6 +326,7 @@ def comparison_sentences(runs: Sequence[Run], headlines: Sequence[Entry]) -> lis
     found = differences(runs, headlines)
     shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {runs[0].name}"
     return [
+        *end_sentences(runs),
         f"{counted(len(runs), 'run')}, {counted(sum(each['strides'] for each in headlines), 'stride')}.",
         *[f"Mean speeds: {', '.join(known)}."] * bool(known),
         *[f"No complete stride in {', '.join(empty)}."] * bool(empty),

@@ -44,6 +44,7 @@ def headline_of(run: Run) -> Entry:
     reactions = [reaction_of(cause) for cause in run.causes]
     muds = run.strides[run.strides["mud"] != ""].groupby("mud", sort=False)
     return {
+        "complete": run.log is None or run.log.complete,  # False where the writer was cut off, or still writes
         "trial": trial_of(run.log) if run.log else {},
         "walks": len(run.walks),
         **travel_of(run.walks),
@@ -127,12 +128,19 @@ def headline_sentences(run: Run, headline: Entry) -> list[str]:
     strides, outcomes = headline["strides"], headline["outcomes"]
     known = [f"{outcomes[outcome]} {doing}" for outcome, doing in DOING.items() if outcomes[outcome]]
     text = f"{counted(strides, 'stride')}{': ' * bool(known)}{', '.join(known)}." if strides else "No complete stride."
-    sentences = [*trial_sentences(headline["trial"]), _travel_sentence(headline), text]
+    sentences = [*end_sentences([run]), *trial_sentences(headline["trial"]), _travel_sentence(headline), text]
     if run.log:
         stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
         warnings = f"; {counted(headline['warnings'], 'warning')}" * bool(headline["warnings"])
         sentences.append(f"{stops}{warnings}.")
     return sentences
+
+
+def end_sentences(runs: Sequence[Run]) -> list[str]:
+    """Return which logs end early; none where all are whole."""
+    early = [run.name for run in runs if run.log and not run.log.complete]
+    what = f"{', '.join(early)} {'ends' if len(early) == 1 else 'end'} early"
+    return [f"{what}: cut off, or still being written."] * bool(early)
 
 
 def trial_sentences(trial: Trial) -> list[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ACTIVE, DONE, PRESERVED = "active", "done", "kept"
+COPIED = "copied"  # has an empty file for each log that was copied to another computer
 TOP = "."  # the folder itself
 ENDING = ".mcap"
 BROKEN = ".broken"  # after the name of a log that is being rewritten
@@ -109,15 +110,36 @@ def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, mo
 
 
 def deletable_logs(folder: Path) -> list[Path]:
-    """Return the finished logs, the oldest first, without the newest: it shows what happened last."""
+    """Return the finished logs, copied ones before others, the oldest first; without the newest of all."""
     unfinished = unfinished_files(folder)
-    return [path for path in log_files(folder, TOP, DONE) if path not in unfinished][:-1]
+    finished = [path for path in log_files(folder, TOP, DONE) if path not in unfinished]
+    return sorted(finished[:-1], key=lambda path: not mark_of(path, folder).exists())
+
+
+def mark_of(log: Path, folder: Path) -> Path:
+    """Return the file that says in a folder of logs that a log was copied; it is no log by its name."""
+    return folder / COPIED / log.stem
+
+
+def quota_text(folder: Path, quota_bytes: int, min_free_fraction: float) -> str:
+    """Return what the quota deletes, when, and how many logs were not copied yet."""
+    logs = log_files(folder, TOP, DONE)
+    left = sum(not mark_of(path, folder).exists() for path in logs)
+    limits = [f"more than {quota_bytes / 1e9:g} GB of logs"] * (quota_bytes > 0)
+    limits += [f"less than {100.0 * min_free_fraction:g} % of the disk free"] * (min_free_fraction > 0.0)
+    if not limits:
+        return f"no log is deleted; {left} of {len(logs)} not copied"
+    rule = "the oldest copied log is deleted, uncopied ones last"
+    return f"at {' or '.join(limits)} {rule}; {left} of {len(logs)} not copied"
 
 
 def delete_log(path: Path) -> str:
     """Delete a log, and return the message about it."""
-    message = f"room for logs: {path.name} was deleted, {_size(path)} bytes"
+    mark = mark_of(path, path.parent.parent if path.parent.name == DONE else path.parent)
+    copied = "copied before" if mark.exists() else "not copied"
+    message = f"room for logs: {path.name} was deleted, {_size(path)} bytes, {copied}"
     path.unlink()
+    mark.unlink(missing_ok=True)
     return message
 
 

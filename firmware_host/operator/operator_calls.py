@@ -331,6 +331,8 @@ def _log_report(loop: Loop, now_s: float) -> dict[str, Any]:
         "slowest_write_s": known(log.slowest_write_s),
         "durable_age_s": known(now_s - log.durable_stamp_s),
         "repairing": log.repairing,
+        "quota_bytes": loop.configuration.log.quota_bytes,
+        "min_free_fraction": loop.configuration.log.min_free_fraction,
     }
 
 

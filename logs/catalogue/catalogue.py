@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import duckdb
 
-from firmware_host.log.log_folder import ACTIVE, ENDING
+from firmware_host.log.log_folder import ACTIVE, DONE, ENDING, PRESERVED
 from logs.catalogue.entry import (
     COLUMNS,
     TRIALS,
@@ -123,7 +123,7 @@ class Catalogue:
         """
         before = self.entries()
         known = {stamp_of_entry(entry): entry for entry in before if entry.state == "whole" or not broken_again}
-        present = list(_stamped(closed_logs(self._folder)))
+        present = _without_copies(_stamped(closed_logs(self._folder)))
         new = [(path, stamp) for path, stamp in present if stamp not in known]
         deadline_s, read = time.monotonic() + longest_s, 0
         try:
@@ -134,7 +134,9 @@ class Catalogue:
                 read += 1
                 watch("logs read", read, len(new))
         finally:
-            entries = [known[stamp]._replace(file=self._name_of(path)) for path, stamp in present if stamp in known]
+            entries = _mark_copies(
+                known[stamp]._replace(file=self._name_of(path)) for path, stamp in present if stamp in known
+            )
             if set(entries) != set(before):
                 self._store(before, entries)
         return len(new) - read
@@ -193,6 +195,29 @@ def _stamped(paths: Iterable[Path]) -> Iterator[tuple[Path, FileStamp]]:
     for path in paths:
         with suppress(OSError):  # removed meanwhile
             yield path, stamp_of(path)
+
+
+def _without_copies(present: Iterable[tuple[Path, FileStamp]]) -> list[tuple[Path, FileStamp]]:
+    """Leave out files with the name and the size of another one, such as a report's copy: the one higher up stays."""
+    found: dict[tuple[str, int], tuple[Path, FileStamp]] = {}
+    for path, stamp in sorted(present, key=lambda each: (len(each[0].parts), each[0])):
+        found.setdefault((stamp.name, stamp.bytes), (path, stamp))
+    return sorted(found.values(), key=lambda each: each[0].name)
+
+
+def _mark_copies(entries: Iterable[LogEntry]) -> list[LogEntry]:
+    """Return the entries, of which one alone has the numbers of a segment of a run: renamed copies have none."""
+    first: dict[object, str] = {}
+    marked = []
+    for entry in sorted(entries, key=lambda each: (not each.file.startswith((DONE, PRESERVED)), each.file)):
+        contents = (entry.run, entry.segment, entry.duration_s, entry.recovered)
+        original = first.setdefault(contents, entry.file) if entry.run and entry.state == "whole" else entry.file
+        marked.append(entry if entry.file == original else _copy_of(original, entry))
+    return marked
+
+
+def _copy_of(original: str, entry: LogEntry) -> LogEntry:
+    return LogEntry(entry.file, "copy", f"of {original}", entry.bytes, entry.changed_ns)
 
 
 def _read_entry(path: Path, file: str, stamp: FileStamp) -> LogEntry:

@@ -101,6 +101,7 @@ MISSING_INPUTS = [
     "log query select /none/logs",
     "log recover /none/x.mcap",
     "log open /none/x.mcap --with rerun",
+    "log pull /none/logs",
     "replay /none/x.mcap",
     "replay text.mcap --config /none/x.toml",
     "plot /none/x.mcap",

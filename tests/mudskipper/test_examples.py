@@ -37,6 +37,8 @@ def test_a_log_is_arrays_by_field_name() -> None:
     assert log.events["text"].tolist() == [event["text"] for event in read.events]
     assert log.configuration.robot.name == "mudskipper" and log.metadata["robot"] == "test"
     assert log.complete and not log.unknown_fields
+    shown = str(log).splitlines()
+    assert len(shown) <= 10 and f"{len(log.ticks)} rows" in str(log) and "whole" in shown[-1]
 
 
 def test_a_log_without_strides_has_their_fields(tmp_path: Path) -> None:

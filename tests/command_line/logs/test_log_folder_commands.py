@@ -55,7 +55,7 @@ def test_incomplete_logs_are_listed_and_counted(folder: Path, capsys: pytest.Cap
     assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
     assert {log["name"]: log["state"] for log in report["logs"]} == {
-        "00.mcap": "whole",
+        "00.mcap": "copy",
         "0.mcap": "broken",
         "1.mcap": "whole",
         "2.mcap": "unfinished",

@@ -21,7 +21,7 @@ from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.command_line.command_lines import failure
+from tests.command_line.command_lines import failure, run
 from tests.folders import SHARED_DATA
 from tests.recorded_walks import record_walks
 
@@ -193,6 +193,14 @@ def test_logs_that_cannot_be_read_are_refused_by_name(log: Path, capsys: pytest.
             message = failure(capsys, "log", "report", *words, "--out", str(folder / "out"))
             assert message.startswith(f"mudskipper: {path}: ")
     assert not (folder / "out").exists()
+
+
+def test_a_log_that_is_cut_off_is_named_in_headline_json_and_exit_status(log: Path) -> None:
+    log.write_bytes(log.read_bytes()[: log.stat().st_size * 9 // 10])
+    ended = run("log", "report", str(log), "--json", "--out", str(log.parent / "out"))
+    assert ended.returncode == exit_codes.UNHEALTHY
+    assert json.loads(ended.stdout)["headline"]["complete"] is False
+    assert ended.stderr.startswith("two ends early: ")
 
 
 def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,7 +20,9 @@ from firmware_host.log.log_folder import (
     free_space,
     log_files,
     make_folder,
+    mark_of,
     new_run_id,
+    quota_text,
     segment_path,
     stored_files,
     unfinished_files,
@@ -64,7 +66,7 @@ def test_the_quota_frees_old_finished_logs(
     for subfolder, names in logs.items():
         make_files(tmp_path, subfolder, *names)
     freed = list(delete_by_quota(tmp_path, quota_bytes, min_free_fraction))
-    assert freed == [f"room for logs: {name}.mcap was deleted, 100 bytes" for name in deleted]
+    assert freed == [f"room for logs: {name}.mcap was deleted, 100 bytes, not copied" for name in deleted]
     left = {path.stem for path in log_files(tmp_path, ACTIVE, DONE, PRESERVED)}
     assert left == set("".join(logs.values())) - set(deleted)
 
@@ -129,3 +131,13 @@ def test_a_link_that_replaces_a_new_folder_is_not_followed(tmp_path: Path, monke
     with pytest.raises(OSError):
         make_folder(logs / "done")
     assert target.stat().st_uid == 0
+
+
+def test_logs_that_were_not_copied_are_deleted_last(tmp_path: Path) -> None:
+    make_files(tmp_path, DONE, *"1234")
+    for name in "23":
+        mark_of(tmp_path / DONE / f"{name}.mcap", tmp_path).parent.mkdir(exist_ok=True)
+        mark_of(tmp_path / DONE / f"{name}.mcap", tmp_path).touch()
+    assert "2 of 4 not copied" in quota_text(tmp_path, 150, 0.0)
+    assert [text.split()[3] for text in delete_by_quota(tmp_path, 150, 0.0)] == ["2.mcap", "3.mcap", "1.mcap"]
+    assert not list((tmp_path / "copied").iterdir())

@@ -265,7 +265,7 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     ours = read_log(tmp_path / DONE / "run-0001.mcap")
     assert ours.ticks["tick"].tolist() == list(range(200, 210))
     assert [event["text"] for event in ours.events] == [
-        "room for logs: 1.mcap was deleted, 5000 bytes",
+        "room for logs: 1.mcap was deleted, 5000 bytes, not copied",
         "rows missing here: 190, the log could not be written: No space left on device",
     ]
     left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
@@ -278,7 +278,7 @@ def test_the_quota_frees_the_oldest_and_says_so(tmp_path: Path) -> None:
     log.write([make_event("first")])
     assert log.close()
     events = [event["text"] for event in read_log(tmp_path / DONE / "run-0000.mcap").events]
-    assert "room for logs: 1.mcap was deleted, 5000 bytes" in events
+    assert "room for logs: 1.mcap was deleted, 5000 bytes, not copied" in events
 
 
 def test_thinning_is_said_in_the_log(tmp_path: Path) -> None:

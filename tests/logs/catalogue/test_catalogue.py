@@ -90,6 +90,21 @@ def test_a_log_that_moved_is_known_and_a_deleted_one_forgotten(folder: Path, rea
     assert readings == []
 
 
+def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
+    (folder / "report").mkdir()
+    log = LogFile(folder / ACTIVE / "run-0000.mcap", OPENING | {"metadata": {"run_id": "other", "segment": "0"}})
+    log.write(make_ticks(0, 39))
+    path = log.finish()
+    for name in ("run-0000.mcap", "same.mcap"):
+        (folder / "report" / name).write_bytes(path.read_bytes())
+    entries = updated(folder)
+    assert "report/run-0000.mcap" not in entries and readings.count("run-0000.mcap") == 1
+    states = {file: (entry.state, entry.duration_s is None) for file, entry in entries.items()}
+    assert states["done/run-0000.mcap"] == ("whole", False) and states["report/same.mcap"] == ("copy", True)
+    updated(folder)
+    assert len(readings) == 4  # nothing is read again
+
+
 def test_a_broken_log_is_an_entry_with_its_reason(folder: Path) -> None:
     (folder / DONE / "cut.mcap").write_bytes(WALK.read_bytes()[:-100])
     (folder / DONE / "text.mcap").write_text("no log", encoding="utf-8")

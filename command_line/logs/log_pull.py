@@ -1,0 +1,113 @@
+"""`mudskipper log pull`: copies finished logs from a robot with rsync over SSH, compares them, and marks them there.
+
+A mark is an empty file in copied/ of the robot's folder of logs; the quota deletes marked logs first. The same mark in
+the folder here says that a log need not be compared again. An interrupted copy continues with the same command.
+"""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from command_line import exit_codes
+from command_line.errors import CommandError
+from command_line.json_output import print_json
+from command_line.screen import complain
+from command_line.shared_options import Json
+from experiments.reports.counted_nouns import counted
+from experiments.study.option import Option
+from experiments.study.values import folder
+from firmware_host.log.log_folder import COPIED, DONE, ENDING, PRESERVED, log_files, mark_of
+
+ROBOTS_LOGS = "/var/lib/mudskipper/logs"
+SILENT_S = 30  # of the network: the copy ends
+PLACES = [f"--include=/{name}/" for name in (DONE, PRESERVED)]  # of finished logs, here as there
+RSYNC = ("rsync", "--recursive", "--times", f"--timeout={SILENT_S}", "--partial-dir=.partial")
+SSH = f"--rsh=ssh -o ConnectTimeout={SILENT_S}"
+
+
+def pull(
+    robot: Annotated[str, Option("robot: or user@robot:FOLDER, or a folder here", metavar="ROBOT:[FOLDER]")],
+    into: Annotated[Path, Option("for the logs", metavar="DIR", parse=folder)] = Path("robot-logs"),
+    *,
+    json: Json = False,
+) -> int:
+    source = f"{robot}{ROBOTS_LOGS}" if robot.endswith(":") else robot.rstrip("/")
+    if ":" not in robot and not Path(robot).is_dir():
+        raise CommandError(f"{robot}: there is no such folder, and a robot's name ends with a colon: '{robot}:'")
+    into.mkdir(parents=True, exist_ok=True)
+    before = set(log_files(into, DONE, PRESERVED))
+    progress = ["--ignore-existing", *["--info=progress2"] * sys.stderr.isatty()]  # a note may have been added here
+    try:
+        _rsync(source, [*progress, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"])
+        logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
+        different = _compare(source, into, logs)
+    except CommandError as problem:
+        copied = len(set(log_files(into, DONE, PRESERVED)) - before)
+        raise CommandError(f"{problem}; {counted(copied, 'new log')} copied, the same command continues") from None
+    same = [path for path in logs if path.name not in different]
+    _mark(source, into, same)
+    report = {"folder": str(into), "copied": [path.name for path in same], "different": different}
+    if json:
+        print_json("log-pull", report)
+    else:
+        print(f"{into}: {counted(len(same), 'log')} copied, compared and marked on the robot")
+    complain(
+        *(
+            f"{name}: differs from the robot's and is not marked: move it away here, and repeat the command"
+            for name in different
+        )
+    )
+    return exit_codes.UNHEALTHY if different else exit_codes.OK
+
+
+def _rsync(source: str, arguments: Sequence[str]) -> str:
+    """Return what it prints without --info. Raises CommandError with rsync's own reason."""
+    shown = sys.stderr.fileno() if "--info=progress2" in arguments else subprocess.PIPE
+    command = [*RSYNC, SSH, *arguments]
+    try:
+        ended = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=shown,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    except FileNotFoundError:
+        raise CommandError("rsync is not installed here: 'apt install rsync'") from None
+    if ended.returncode:
+        reasons = ended.stderr.strip().splitlines() or ["it gave no reason"]
+        raise CommandError(f"{source}: rsync ended with status {ended.returncode}: {reasons[0]}")
+    return ended.stdout or ""
+
+
+def _compare(source: str, into: Path, logs: Sequence[Path]) -> list[str]:
+    """Return the names of logs whose bytes are not those of the robot."""
+    if not logs:
+        return []
+    only = [*PLACES, *(f"--include=/*/{path.name}" for path in logs), "--exclude=*"]
+    compared = ["--checksum", "--dry-run", "--existing", "--out-format=%n", *only]
+    printed = _rsync(source, [*compared, f"{source}/", f"{into}/"])
+    return [Path(line).name for line in printed.splitlines() if line.endswith(ENDING)]
+
+
+def _mark(source: str, into: Path, logs: Sequence[Path]) -> None:
+    """Mark the logs on the robot, and then here. Raises CommandError where the robot's folder may not be written."""
+    with tempfile.TemporaryDirectory() as name:
+        _touch_marks(Path(name), logs)
+        if logs:
+            try:
+                _rsync(source, [f"{name}/{COPIED}", f"{source}/"])
+            except CommandError as problem:
+                done = f"{counted(len(logs), 'log')} copied to {into}, but not marked on the robot"
+                raise CommandError(f"{done}: {problem}; pull as a user who may write its folder of logs") from None
+    _touch_marks(into, logs)
+
+
+def _touch_marks(place: Path, logs: Sequence[Path]) -> None:
+    (place / COPIED).mkdir(exist_ok=True)
+    for path in logs:
+        mark_of(path, place).touch()

@@ -1,0 +1,74 @@
+"""`mudskipper log pull` copies finished logs once, marks them, and continues; rsync is a double."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from tests.command_line.command_lines import run
+
+RSYNC = """#!{python}
+import pathlib, shutil, sys, os
+*sources, target = [each for each in sys.argv[1:] if not each.startswith("-")]
+target, left = pathlib.Path(target.split(":")[-1]), int(os.environ.get("COPIES", "99"))
+if "--dry-run" in sys.argv:
+    print("\\n".join(filter(None, [os.environ.get("DIFFERENT", "")])))
+    sys.exit()
+for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
+    if source.name == "copied":
+        shutil.copytree(source, target / "copied", dirs_exist_ok=True)
+        continue
+    for log in sorted([*source.glob("done/*.mcap"), *source.glob("kept/*.mcap")]):
+        if (left := left - 1) < 0:
+            sys.exit("ssh: connect to host robot port 22: No route to host")
+        (target / log.parent.name).mkdir(exist_ok=True)
+        shutil.copy2(log, target / log.parent.name)
+"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of logs of a robot that a double of rsync reaches."""
+    program = tmp_path / "bin" / "rsync"
+    program.parent.mkdir()
+    program.write_text(RSYNC.replace("{python}", sys.executable))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(program.parent))
+    monkeypatch.chdir(tmp_path)
+    logs = tmp_path / "robot"
+    for place, name in (("done", "1"), ("done", "2"), ("kept", "3"), ("active", "4")):
+        (logs / place).mkdir(parents=True, exist_ok=True)
+        (logs / place / f"{name}.mcap").write_text(name)
+    return logs
+
+
+def test_finished_logs_are_copied_compared_and_marked_once(robot: Path) -> None:
+    ended = run("log", "pull", f"host:{robot}", "here", "--json")
+    assert (ended.returncode, json.loads(ended.stdout)["copied"]) == (exit_codes.OK, ["1.mcap", "2.mcap", "3.mcap"])
+    assert {path.name for path in (robot / "copied").iterdir()} == {"1", "2", "3"}
+    (robot / "done" / "5.mcap").touch()
+    assert json.loads(run("log", "pull", f"host:{robot}", "here", "--json").stdout)["copied"] == ["5.mcap"]
+
+
+def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
+    ended = run("log", "pull", f"host:{robot}", "here", COPIES="1")
+    assert ended.returncode == exit_codes.UNHEALTHY and "No route to host; 1 new log copied" in ended.stderr
+    assert not (robot / "copied").exists()
+    assert run("log", "pull", f"host:{robot}", "here").returncode == exit_codes.OK
+    assert len(list((robot / "copied").iterdir())) == 3
+
+
+def test_a_log_whose_bytes_differ_is_not_marked(robot: Path) -> None:
+    ended = run("log", "pull", str(robot), "here", DIFFERENT="2.mcap")
+    assert ended.returncode == exit_codes.UNHEALTHY and "2.mcap: differs" in ended.stderr
+    assert {path.name for path in (robot / "copied").iterdir()} == {"1", "3"}
+
+
+def test_without_rsync_or_a_robot_it_says_what_to_do(robot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "'none:'" in run("log", "pull", "none").stderr
+    monkeypatch.setenv("PATH", "/none")
+    assert "apt install rsync" in run("log", "pull", "host:").stderr
