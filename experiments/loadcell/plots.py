@@ -110,5 +110,6 @@ def draw_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> Figur
             value, two_errors = coefficient.value / N_CM3, 2.0 * coefficient.std_error / N_CM3
             panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
-        panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(0.0, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
+        lowest = min(0.0, panel.get_ylim()[0])  # an error bar that reaches below zero is shown in full
+        panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(lowest, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
     return figure

@@ -176,5 +176,8 @@ class AbstractDrives(Drives):
     def health(self) -> Joints[DriveHealth]:
         return Joints(*(DriveHealth(joint) for joint in JOINTS))
 
+    def request_supply(self) -> None:
+        """Asks for nothing."""
+
     def request_settings(self, now_s: float) -> None:
         pass

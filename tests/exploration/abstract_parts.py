@@ -91,6 +91,7 @@ class AbstractMonitor(FaultMonitor):
 
     def __init__(self) -> None:
         self.trusted = same_for_all(True)
+        self.power_cut = ""
         self.world = World()
         self.found: list[Fault] = []
 
