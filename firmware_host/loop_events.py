@@ -54,7 +54,8 @@ class LoopEvents:
         self._bus_of = bus_of
         self.requests = RequestEvents()
         self.forget_notice()
-        self._settling: dict[tuple[str, str], tuple[Fault, float]] = {}  # with the time at which it began
+        self._first_s = inf
+        self._unanswered: dict[tuple[str, str], Fault] = {}  # while drives answer for the first time
 
     def forget_notice(self) -> None:
         self.notice = ""
@@ -79,19 +80,21 @@ class LoopEvents:
             self._recorder.put(STRIDE_KIND, row)
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
-        """Write the faults that began or are over; those of a drive that may still answer only once they last."""
+        """Write the faults that began or are over; what a drive has not answered since the start, once that lasts."""
+        self._first_s = min(self._first_s, now_s)
+        starts = now_s - self._first_s < ANSWERED_S
         for fault in begun:
-            if fault.kind in ASKED:
-                self._settling[fault.name, fault.subject] = fault, now_s
+            if starts and fault.kind in ASKED:
+                self._unanswered[fault.name, fault.subject] = fault
             else:
                 self._report_fault(now_s, fault)
         for fault in over:
-            if self._settling.pop((fault.name, fault.subject), None) is None:
+            if self._unanswered.pop((fault.name, fault.subject), None) is None:
                 self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
-        for key, (fault, begun_s) in list(self._settling.items()) if self._settling else ():
-            if now_s - begun_s > ANSWERED_S:
-                del self._settling[key]
+        if self._unanswered and not starts:
+            for fault in self._unanswered.values():
                 self._report_fault(now_s, fault)
+            self._unanswered.clear()
 
     def _report_fault(self, now_s: float, fault: Fault) -> None:
         self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")

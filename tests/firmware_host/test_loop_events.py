@@ -89,7 +89,13 @@ def test_settings_that_a_drive_reports_soon_after_its_start_were_no_fault(
     events.report_faults(1.0, [UNKNOWN], [])
     events.report_faults(2.0, [], [UNKNOWN])
     assert recorder.texts == []
-    events.report_faults(3.0, [UNKNOWN], [])
-    events.report_faults(5.1, [], [])
-    events.report_faults(5.2, [], [UNKNOWN])
+    events.report_faults(2.5, [UNKNOWN], [])
+    events.report_faults(4.6, [], [])
+    events.report_faults(4.7, [], [UNKNOWN])
     assert [text.split()[1] for text in recorder.texts] == ["watchdog_unknown", "watchdog_unknown"]
+
+
+def test_settings_that_are_lost_later_are_a_fault_at_once(events: LoopEvents, recorder: EventRecorder) -> None:
+    events.report_faults(1.0, [], [])
+    events.report_faults(10.0, [RESTARTED, UNKNOWN], [])
+    assert [text.split()[1] for text in recorder.texts] == ["drive_restarted", "watchdog_unknown"]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from random import Random
 
 from control.controller import WalkOrder
+from control.fault_causes import ANSWERED_S
 from control.modes import Mode, Request
 from control.parameters.fault_bounds import FaultBounds
 from control.parameters.recovery_parameters import RecoveryParameters
@@ -56,7 +57,12 @@ def _as_real(drive: DriveParameters) -> DriveParameters:
 
 
 def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:
-    """Operate the robot into the phase. Raises RuntimeError where it does not get there."""
+    """Operate the robot into the phase. Raises RuntimeError where it does not get there.
+
+    Every drive has its time to answer first: what it has not said by then is in the log before the failure begins.
+    """
+    answered_s = bench.now_s + ANSWERED_S
+    _reach(bench, "answers", lambda: bench.now_s > answered_s)
     _PHASE_ENTRIES[phase](bench, random)
 
 
