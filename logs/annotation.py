@@ -23,8 +23,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from firmware_host.log.log_file import ANNOTATION, METADATA, lock_file
 from firmware_host.trial import METADATA_KEY, Trial, changed, from_json, to_json
-from logs.files.file_pass import ADVICE
-from logs.files.log_error import DAMAGE, LogError
+from logs.files.log_error import ADVICE, DAMAGE, LogError
 
 DATA_END = struct.Struct("<BQI")  # opcode, length, checksum
 FOOTER = struct.Struct("<BQQQI")  # opcode, length, positions of summary and of its offsets, checksum

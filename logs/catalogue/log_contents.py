@@ -16,8 +16,7 @@ from firmware_host.log.log_file import EXPORTED
 from firmware_host.log.rows import COEFFICIENTS
 from firmware_host.trial import KEYS, Trial, to_json
 from logs.catalogue.entry import FileStamp, LogEntry, MudEntry
-from logs.files.file_pass import ADVICE
-from logs.files.log_error import LogError
+from logs.files.log_error import ADVICE, LogError
 from logs.files.log_reader import Log, read_log
 from logs.files.log_summary import log_summary, segment_of
 from logs.files.tick_array import Ticks

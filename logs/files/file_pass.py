@@ -28,10 +28,9 @@ from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TIC
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from logs.files.chunks import RECORD_HEAD, Record, Row, open_chunk, record_at, run_of_rows
 from logs.files.expansion import Expansion
-from logs.files.log_error import DAMAGE, LogError, Watch, unwatched
+from logs.files.log_error import ADVICE, DAMAGE, LogError, Watch, unwatched
 from logs.files.stored_logs import why_not_read
 
-ADVICE = "'mudskipper log recover' saves its readable rows"
 OTHER_VERSION = "read it with the version of mudskipper that wrote it"
 KIND_OF_TOPIC = {kind.topic: number for number, kind in enumerate(ROW_KINDS)}
 

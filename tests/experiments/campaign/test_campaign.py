@@ -155,8 +155,9 @@ def test_each_bad_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
 def test_a_missing_file_and_text_that_is_no_toml_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for path in (tmp_path / "none.toml", written(tmp_path, "[grid")):
-        assert main(["experiment", "campaign", str(path)]) == exit_codes.CONFIGURATION
+    paths = {tmp_path / "none.toml": exit_codes.UNHEALTHY, written(tmp_path, "[grid"): exit_codes.CONFIGURATION}
+    for path, status in paths.items():
+        assert main(["experiment", "campaign", str(path)]) == status
         assert capsys.readouterr().err.count("\n") == 1
 
 
