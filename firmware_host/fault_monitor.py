@@ -180,9 +180,7 @@ class FaultMonitor:
         if at_once and all(port.state is not BusState.OFF for port in self._drives.ports.values()):
             self.power_cut = "all drives fell silent at once"
         if self.power_cut:
-            found.insert(
-                0, FaultKind.POWER_CUT.fault(reason=self.power_cut)
-            )  # of one reaction the first fault is shown
+            found.insert(0, FaultKind.POWER_CUT.fault(reason=self.power_cut))  # the first of one reaction is shown
 
     def _check_joints(
         self, found: list[Fault], tick: Tick, monitor_input: MonitorInput, drives: Joints[DriveHealth]
