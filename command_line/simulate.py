@@ -29,7 +29,7 @@ def simulate(
     *,
     bus: Annotated[str, Option("of the local bus")] = SIMULATED,
     config: Annotated[Path | None, Option("the robot of this configuration, on its buses")] = None,
-    local: Annotated[bool, Option("with --config: on local buses, whatever its interfaces are")] = False,
+    local: Annotated[bool, Option("with --config: on local buses instead of its own")] = False,
     reset: Annotated[bool, Option("move the joints of the robot that is simulated back into their range")] = False,
     emergency_stop: Annotated[
         bool, Option("press the emergency stop of the robot that is simulated, or release it")
@@ -62,8 +62,9 @@ def simulate(
     logs = Path("logs").absolute()
     text = configuration_text(folder, logs)
     if config:
-        parse_configuration(read_text(config), config)
-        text = local_copy(read_text(config), folder, logs)
+        text = read_text(config)
+        parse_configuration(text, config)  # names the keys of the file itself
+        text = local_copy(text, folder, logs)
     make_buses(folder)
     configuration = parse_configuration(text, config)
     named = "" if bus == SIMULATED else f"--bus {bus}"

@@ -1,6 +1,6 @@
 """The emergency stop as an input: a GPIO line, or a key of an input device, that says whether the motors' power is cut.
 
-The switch cuts the power by itself; the input only tells this program, so that it can say so. A contact bounces: two
+The switch cuts the power by itself; the input only reports it, so that this program can say so. A contact bounces: two
 readings in a row count as a cut, and the power is back after RELEASED_S without one. An input that cannot be read any
 more counts as a cut. The packages `gpiod` and `evdev` are needed only by a robot that has such an input.
 """

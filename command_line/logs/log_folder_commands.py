@@ -28,7 +28,6 @@ from firmware_host.log.log_folder import (
     stored_files,
     unfinished_files,
 )
-from firmware_host.trial import changed
 from logs.annotation import annotate
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import DAMAGE, LogError
@@ -175,7 +174,6 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
 def annotate_log(file: Annotated[Path, Option("log of this project")], values: KeyValues, *, json: Json = False) -> int:
     """Add the description to the log itself; its rows stay as they are."""
     try:
-        changed({}, dict(values))
         trial = annotate(file, dict(values))
     except OSError as problem:
         raise LogError(why_not_moved(file, problem)) from None

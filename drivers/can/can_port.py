@@ -163,7 +163,7 @@ def interface_problem(interface: str) -> str:
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool], fd: bool = False) -> CanPort:
-    """Open an interface; raises whatever its python-can driver raises where it does not open: see buses.py.
+    """Open an interface; raises the exceptions of its python-can driver where it does not open: see buses.py.
 
     With `fd` it also carries CAN FD frames; ValueError is raised where it cannot.
 
