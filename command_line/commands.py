@@ -37,6 +37,7 @@ COMMANDS: Mapping[str, Command] = {
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
     "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
     "stop": ("operation.confirmed_stop.stop", "End the walk, raise the flippers and hold the pose."),
+    "joy": ("operation.joy.joy", "Drive the robot by a gamepad or keys: it stops when a button is released."),
     "disarm": ("operation.confirmed_stop.disarm", "Switch torque off at once, in any state."),
     "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
     "check": ("operation.operation.check", "List what prevents the robot from being armed, and what to do about it."),

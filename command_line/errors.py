@@ -13,9 +13,9 @@ NO_DAEMON = (
 )
 EXTRA_OF = {  # by module
     "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
-    "distributed": "cluster",
+    "distributed": "cluster", "evdev": "inputs",
 }  # fmt: skip
-PACKAGES = {"PIL": "pillow"}  # whose name is not that of the module
+PACKAGES = {"PIL": "pillow", "evdev": "evdev-binary"}  # whose name is not that of the module
 
 
 class CommandError(Exception):

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from control.bounds import Bounds, Meaning
 from control.records import NEVER_S
+from drivers.input_keys import InputKeys
 
 READ_S = 0.01  # between two readings
 RELEASED_S = 0.2  # a contact bounces for some 10 ms
@@ -56,7 +57,7 @@ class PowerSwitch:
         self._read_s = now_s
         try:
             cut, reason = self._read(), f"{self._name} says so"
-        except (OSError, SystemError):  # evdev raises the second for a device that was unplugged
+        except OSError:
             cut, reason = True, f"{self._name} cannot be read any more"
         if cut:
             self._cut_s = now_s
@@ -96,12 +97,7 @@ def _open_line(device: str, line: int) -> Callable[[], bool]:
 
 
 def _open_key(device: str, key: str) -> Callable[[], bool]:
-    import evdev
-
-    code = evdev.ecodes.ecodes.get(key)
-    if code is None:
-        raise PowerSwitchError(f"emergency_stop.key = {key!r}: there is no such key; 'evtest' names those of a device")
-    opened = evdev.InputDevice(device)
-    if code not in opened.capabilities().get(evdev.ecodes.EV_KEY, []):
-        raise PowerSwitchError(f"emergency_stop.key = {key!r}: {device} has no such key")
-    return lambda: code in opened.active_keys()
+    opened = InputKeys(device, [key])
+    if key not in opened.keys:
+        raise PowerSwitchError(f"emergency_stop.key = {key!r}: {device} has no such key; 'evtest' names its keys")
+    return lambda: key in opened.pressed()

@@ -285,6 +285,12 @@ class Loop:
             self.pending_request = request
         return None
 
+    def change_depth(self, depth_m: float, now_s: float, by: str) -> None:
+        """Fix the depth of the present walk, also one that adapted; a stride that has begun keeps its own."""
+        self.events.report(now_s, f"depth {depth_m:.4f} m by {by}")
+        self.controller.order = self.controller.order._replace(depth_m=depth_m, adaptive=False)
+        self.controller.gait.next_depth_m = depth_m
+
     def move(self, angles_rad: Mapping[str, float], now_s: float, by: str) -> None:
         """Move joints slowly to these angles, while the pose is held."""
         path = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())

@@ -69,11 +69,11 @@ class LiveLine:
         self._live = sys.stdout.isatty() and not silent
         self._shown = ""
 
-    def show(self, report: dict[str, Any]) -> None:
+    def show(self, report: dict[str, Any], hint: str = "Ctrl-C stops") -> None:
         summary = f"{report['mode']}, stride {report['stride']}"
         if self._live:
             depth_cm, x_m = 100.0 * report["depth_m"], number(report["body_x_m"])
-            text = f"{summary}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; Ctrl-C stops"
+            text = f"{summary}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; {hint}"
             print(f"\r\033[K{text}", end="", flush=True)
         elif summary != self._shown and not self._silent:
             print(summary, flush=True)

@@ -77,6 +77,7 @@ class OperatorCalls:
             "check": lambda params, caller: arming_checks(self._loop, self._warnings),
             "arm": self._as_holder(lambda params, caller: self._request(caller, Request.ARM, forced=params["force"])),
             "walk": self._as_holder(self.walk),
+            "depth": self._as_holder(self.depth),
             "move": self._as_holder(self.move),
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
@@ -165,18 +166,32 @@ class OperatorCalls:
         return map_report(self._loop.learning.estimator.map.rows(after_m, PIECES_PER_ANSWER))
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
-        adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
+        depth_m = params["depth_m"]
         trial = self._trials.planned(params)
-        if depth_m is not None and not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
-            raise RefusedError(
-                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
-                f" {100.0 * adaptation.max_depth_m:g} cm, which is adaptation.max_depth_m in the configuration"
-            )
+        self._require_depth(depth_m)
         adaptive = depth_m is None
-        first_m = adaptation.initial_depth_m if adaptive else float(depth_m)
+        first_m = self._loop.configuration.adaptation.initial_depth_m if adaptive else float(depth_m)
         answer = self._request(caller, Request.WALK, WalkOrder(first_m, adaptive, params["strides"]))
         self._trials.begin(trial, caller)
         return answer
+
+    def _require_depth(self, depth_m: float | None) -> None:
+        """Raise RefusedError for a depth beyond the configured ones."""
+        deepest_m = self._loop.configuration.adaptation.max_depth_m
+        if depth_m is not None and not SHALLOWEST_M <= depth_m <= deepest_m:
+            raise RefusedError(
+                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
+                f" {100.0 * deepest_m:g} cm, which is adaptation.max_depth_m in the configuration"
+            )
+
+    def depth(self, params: dict[str, Any], caller: Caller) -> str:
+        self._require_depth(params["depth_m"])
+        if self._loop.mode is not Mode.WALKING:
+            raise RefusedError(
+                f"cannot change the depth in mode {self._loop.mode.name.lower()}: the robot does not walk"
+            )
+        self._loop.change_depth(params["depth_m"], self._clock(), str(caller))
+        return "accepted"
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:
         loop = self._loop

@@ -276,6 +276,11 @@ METHODS: dict[str, SocketMethod] = {
         "Walk, with a depth that adapts to the mud or is fixed. A described walk is a trial: it begins a new log.",
         (DEPTH, STRIDES, *LEASE, *TRIAL),
     ),
+    "depth": SocketMethod(
+        Level.DRIVE,
+        "Fix the depth of the present walk, from the next stride on, or from the second if that one is being chosen.",
+        (DEPTH._replace(meaning="depth of every stride", null_is_default=False, required=True), *LEASE),
+    ),
     "move": SocketMethod(
         Level.DRIVE,
         "Move joints slowly to angles while the robot holds its pose; at least one joint is required.",

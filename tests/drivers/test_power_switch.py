@@ -51,7 +51,7 @@ RELEASED = [0] * (int(RELEASED_S / STEP_S) + 1)
         ([0, 1, 1, 0, 1, 0, 0, 1], [False, False, *[True] * 6]),  # bounces once it is cut
         ([1, 1, *RELEASED], [False, *[True] * 20, False]),
         ([1, 1, *RELEASED[:-1], 1, *RELEASED], [False, *[True] * 40, False]),  # the release bounces
-        ([0, OSError("gone"), SystemError(), 0], [False, False, True, True]),
+        ([0, OSError("gone"), OSError(), 0], [False, False, True, True]),
     ],
 )
 def test_a_contact_bounces_and_an_input_that_vanishes_counts_as_cut(readings: list[Any], cut: list[bool]) -> None:
@@ -74,11 +74,11 @@ def gpio(value: Any, opened: list[Any]) -> dict[str, Any]:
 class Evdev(SimpleNamespace):
     """A module like evdev with one device, whose key 1 is pressed."""
 
-    ecodes = SimpleNamespace(ecodes={"KEY_ESC": 1, "KEY_A": 30, "KEY_B": 48}, EV_KEY=1)
+    ecodes = SimpleNamespace(ecodes={"KEY_ESC": 1, "KEY_A": 30, "KEY_B": 48}, EV_KEY=1, EV_ABS=3)
 
     @staticmethod
     def InputDevice(path: str) -> Any:  # noqa: N802
-        return SimpleNamespace(active_keys=lambda: [1], capabilities=lambda: {1: [1, 30]})
+        return SimpleNamespace(name="", active_keys=lambda: [1], capabilities=lambda absinfo: {1: [1, 30]})
 
 
 @pytest.mark.parametrize(

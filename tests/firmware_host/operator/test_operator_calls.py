@@ -108,7 +108,7 @@ def test_a_refused_request_is_not_logged(robot: Robot) -> None:
 def test_every_method_is_in_the_table_with_its_level(robot: Robot) -> None:
     assert METHODS.keys() - robot.names == {"fail", "failures"} and robot.names <= METHODS.keys()
     for_operators = {name for name, method in METHODS.items() if method.level is Level.DRIVE}
-    moving = {"arm", "walk", "move", "clear", "lease", "release"}
+    moving = {"arm", "walk", "depth", "move", "clear", "lease", "release"}
     assert for_operators == moving | {"trial_set", "note", "mark", "reset_timing", "fail"}
 
 
@@ -366,3 +366,21 @@ def test_a_walk_with_a_null_depth_adapts_its_depth(armed: Robot) -> None:
     assert armed.steps.loop.controller.order.adaptive
     with pytest.raises(RefusedError, match="strides = None: must be a whole number"):
         armed.ask("walk", strides=None)
+
+
+def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(armed: Robot) -> None:
+    loop = armed.steps.loop
+    with pytest.raises(RefusedError, match="hold"):
+        armed.ask("depth", depth_m=0.02)
+    armed.ask("walk")
+    armed.steps.run_until(lambda: loop.target.stride == 1, 20.0)
+    with pytest.raises(RefusedError, match="max_depth_m"):
+        armed.ask("depth", depth_m=0.2)
+    begun_m = loop.stride_depth_m
+    armed.ask("depth", depth_m=0.02)
+    armed.steps.step()
+    assert loop.stride_depth_m == begun_m != 0.02
+    armed.steps.run_until(lambda: loop.target.stride == 3, 20.0)
+    assert loop.stride_depth_m == 0.02 and armed.events.texts.count(f"depth 0.0200 m by {ANNA}") == 1
+    armed.steps.run_until(lambda: loop.target.stride == 5, 20.0)
+    assert loop.stride_depth_m == 0.02
