@@ -59,6 +59,12 @@ def test_the_rows_of_a_list_are_named_by_what_they_say() -> None:
     assert claimed_figures(claim, output) == rows_k | points_k | {"ends/0": 7, "ends/1": 8}
 
 
+def test_a_slash_in_a_name_does_not_part_its_path() -> None:
+    output = {"rows": [{"speed": "1 rad/s", "k": 1.0}, {"speed": "stopped", "k": 2.0}], "m/s": 3.0}
+    claim = Claim("a", "", {"rows/*/k": "exact", "m|s": "exact"})
+    assert claimed_figures(claim, output) == {"rows/1 rad|s/k": 1.0, "rows/stopped/k": 2.0, "m|s": 3.0}
+
+
 @pytest.mark.parametrize(
     ("tolerance", "within", "outside"),
     [

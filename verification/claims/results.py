@@ -1,8 +1,9 @@
 """What each command of `claims.toml` measured last: `docs/results/NAME.json`, from which the pages take their figures.
 
 A figure is a number, a text or a truth in the JSON of its command. Its name is the path to it, such as
-`table/3 cm/48.5/mean`; a row of a list is named by its texts, as `errors/walking, 49.5, k_s, default/median`. A
-claim names its figures by patterns of paths, each with a tolerance: parts after commas must all be met.
+`table/3 cm/48.5/mean`; a row of a list is named by its texts, as `errors/walking, 49.5, k_s, default/median`. A slash
+in a name becomes a bar: `rad|s`. A claim names its figures by patterns of paths, each with a tolerance: parts after
+commas must all be met.
 
     exact     the same as before
     0.1       at most that far from the figure before
@@ -107,7 +108,8 @@ def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Figure]]:
         yield path, value
         return
     for key, each in items:
-        yield from _leaves(each, f"{path}/{key}" if path else key)
+        name = key.replace("/", "|")
+        yield from _leaves(each, f"{path}/{name}" if path else name)
 
 
 def _row_names(rows: list[Any]) -> list[str]:
@@ -115,7 +117,7 @@ def _row_names(rows: list[Any]) -> list[str]:
     if all(isinstance(row, dict) and row for row in rows):
         texts = [", ".join(each for each in row.values() if isinstance(each, str)) for row in rows]
         for names in (texts, [str(next(iter(row.values()))) for row in rows]):
-            if len(set(names)) == len(rows) and all(each and "/" not in each for each in names):
+            if len(set(names)) == len(rows) and all(names):
                 return names
     return [str(position) for position in range(len(rows))]
 
