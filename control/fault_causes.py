@@ -13,7 +13,7 @@ from control.faults import Blocks, Fault, FaultKind, Reaction
 
 BEFORE_S = 1.0  # a consequence may be detected this long before its cause: a heartbeat is missed after 0.5 s
 RESTART_S = 5.0  # before a restart, which is known once the drive has booted
-ANSWERED_S = 2.0  # in which a drive that has just started was asked for its settings four times
+ANSWERED_S = 2.0  # after all drives were heard first: each was asked for its settings four times
 K = FaultKind
 ASKED = (K.DRIVE_VERSION, K.WRONG_DRIVE, K.WATCHDOG_UNKNOWN)  # until the drive has answered
 SIGNALS = (
@@ -72,9 +72,12 @@ class AgedFault(NamedTuple):
     age_s: float  # since it was first detected
 
 
-def is_settling(each: AgedFault) -> bool:
-    """Return whether a drive that has just started may still answer, so that nothing needs to be shown or logged."""
-    return each.fault.kind in ASKED and each.age_s < ANSWERED_S
+def is_settling(fault: Fault, heard_s: float) -> bool:
+    """Return whether a drive may still answer, `heard_s` after the first time at which all of them were heard.
+
+    What is settling blocks arming, and is neither shown nor logged.
+    """
+    return fault.kind in ASKED and heard_s < ANSWERED_S
 
 
 class Cause(NamedTuple):

@@ -7,7 +7,7 @@ robot is moved again.
 from collections.abc import Iterable, Mapping
 from math import inf
 
-from control.fault_causes import ANSWERED_S, ASKED, AgedFault, group_by_cause
+from control.fault_causes import AgedFault, group_by_cause, is_settling
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
@@ -54,8 +54,8 @@ class LoopEvents:
         self._bus_of = bus_of
         self.requests = RequestEvents()
         self.forget_notice()
-        self._first_s = inf
-        self._unanswered: dict[tuple[str, str], Fault] = {}  # while drives answer for the first time
+        self._heard_s = inf  # the stamp at which all drives were heard for the first time
+        self._settling: dict[tuple[str, str], Fault] = {}
 
     def forget_notice(self) -> None:
         self.notice = ""
@@ -80,21 +80,21 @@ class LoopEvents:
             self._recorder.put(STRIDE_KIND, row)
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
-        """Write the faults that began or are over; what a drive has not answered since the start, once that lasts."""
-        self._first_s = min(self._first_s, now_s)
-        starts = now_s - self._first_s < ANSWERED_S
+        """Write the faults that began or are over; those that may settle once they have not."""
+        heard_s = now_s - self._heard_s
         for fault in begun:
-            if starts and fault.kind in ASKED:
-                self._unanswered[fault.name, fault.subject] = fault
-            else:
+            self._settling[fault.name, fault.subject] = fault
+        for key, fault in list(self._settling.items()) if self._settling else ():
+            if not is_settling(fault, heard_s):
+                del self._settling[key]
                 self._report_fault(now_s, fault)
         for fault in over:
-            if self._unanswered.pop((fault.name, fault.subject), None) is None:
+            if self._settling.pop((fault.name, fault.subject), None) is None:
                 self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
-        if self._unanswered and not starts:
-            for fault in self._unanswered.values():
-                self._report_fault(now_s, fault)
-            self._unanswered.clear()
+
+    def is_settling(self, fault: Fault) -> bool:
+        """Return whether a present fault is not logged, because its drive may still answer."""
+        return (fault.name, fault.subject) in self._settling
 
     def _report_fault(self, now_s: float, fault: Fault) -> None:
         self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
@@ -131,6 +131,8 @@ class LoopEvents:
 
         `fault` is the worst that is more than a warning; `rested`: the pose was held for the longest permitted time.
         """
+        if before is Mode.BOOT:
+            self._heard_s = now_s
         because = f": {fault.message}" if fault else ""
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):

@@ -7,6 +7,7 @@ none is present any more; within it, a fault may follow from another. The same c
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from math import inf
 from typing import Any, NamedTuple
 
 from control.fault_causes import AgedFault, Cause, group_by_cause, is_settling
@@ -15,6 +16,7 @@ from control.records import FLIPPERS, JOINTS
 
 BEGUN = re.compile(r"fault (\w+) \(\w+\): (.*)", re.DOTALL)
 OVER = re.compile(r"over: (\w+) ?(.*)")
+HEARD = "mode boot to "  # all drives, for the first time
 
 
 class LoggedCause(NamedTuple):
@@ -57,7 +59,10 @@ def read_buses(configuration_text: str) -> dict[str, str]:
 def _episodes(events: Iterable[Mapping[str, Any]], buses: set[str]) -> list[list[Begun]]:
     episodes: list[list[Begun]] = []
     present: set[tuple[str, str]] = set()
+    heard_s = -inf
     for event in events:
+        if event["text"].startswith(HEARD):
+            heard_s = event["stamp_s"]
         begun, over = BEGUN.fullmatch(event["text"]), OVER.fullmatch(event["text"])
         if begun and begun[1] in FAULT_KINDS:
             kind, message = FAULT_KINDS[begun[1]], begun[2]
@@ -69,7 +74,7 @@ def _episodes(events: Iterable[Mapping[str, Any]], buses: set[str]) -> list[list
         elif over and episodes:
             present = {each for each in present if each != (over[1], over[2])}
             ended = [each for each in episodes[-1] if (each.fault.name, each.fault.subject) == (over[1], over[2])]
-            if ended and is_settling(AgedFault(ended[-1].fault, event["stamp_s"] - ended[-1].stamp_s)):
+            if ended and is_settling(ended[-1].fault, event["stamp_s"] - heard_s):
                 episodes[-1].remove(ended[-1])  # only logs of version 0.2 and before have these
     return list(filter(None, episodes))
 

@@ -11,7 +11,7 @@ from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import group_by_cause, is_settling
+from control.fault_causes import group_by_cause
 from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
@@ -134,7 +134,7 @@ class OperatorCalls:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
             gravest = ordered[:FAULTS_PER_ANSWER]
         faults = {each.fault: _fault_report(*each) for each in gravest}
-        lasting = [each for each in gravest if not is_settling(each)]
+        lasting = [each for each in gravest if not self._loop.events.is_settling(each.fault)]
         causes, stop = group_by_cause(lasting, self._bus_of), self._loop.events.stop_fault
         if stop:
             causes.sort(key=lambda cause: not cause.includes(stop))

@@ -8,6 +8,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.faults import FaultKind
+from control.modes import Mode
 from control.records import FLIPPERS, JOINTS
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
@@ -36,8 +37,8 @@ def test_every_fault_of_every_part_is_read_back(kind: FaultKind) -> None:
     for subject in SUBJECTS.get(kind.part, ("",)):
         recorder = EventRecorder()
         written = LoopEvents(recorder, 1.0, {})
+        written.report_mode_change(0.0, Mode.BOOT, Mode.IDLE, None, rested=False, flippers_up=True)
         written.report_faults(10.0, [kind.fault(subject)], [])
-        written.report_faults(20.0, [], [])  # a drive that has just started had time to answer
         (cause,) = read_causes(events(*recorder.texts), TEXT)
         assert (cause.name, cause.subjects, cause.consequences) == (kind, (subject,), ())
 
@@ -52,8 +53,10 @@ def test_faults_that_were_never_present_together_do_not_follow_from_each_other()
 
 def test_what_a_drive_reports_soon_after_its_start_was_no_fault() -> None:
     unknown, over = "fault watchdog_unknown (none): The left_sweep drive.", "over: watchdog_unknown left_sweep"
-    assert read_causes(events(unknown, over), TEXT) == []
-    assert len(read_causes(events(unknown, *["nothing"] * 3, over), TEXT)) == 1
+    heard = "mode boot to idle"
+    assert read_causes(events(unknown, heard, over), TEXT) == []
+    assert len(read_causes(events(unknown, heard, *["nothing"] * 3, over), TEXT)) == 1
+    assert len(read_causes(events(heard, *["nothing"] * 3, unknown, over), TEXT)) == 1
 
 
 class StampedEvents(NullRecorder):
