@@ -21,7 +21,6 @@ from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import Floats, RecordedWalk
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
 from experiments.pictures.walk_trace import rows_of_curve
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.style import (
     FAINT,
     FLIPPER_COLOURS,
@@ -33,6 +32,7 @@ from experiments.reports.style import (
     UP,
     save_picture,
 )
+from firmware_host.log.rows import COEFFICIENTS
 
 WIDTH_IN, PANEL_IN = 10.0, 1.55
 TITLE_HEIGHT = 1.3  # above the names of the muds, in heights of a panel

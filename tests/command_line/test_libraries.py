@@ -61,3 +61,13 @@ def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> No
     assert "walk.mcap" in found.stdout and found.stdout.splitlines()[-1] == str(statuses)
     assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data")] == [3, 2]
     assert "Traceback" not in found.stderr
+
+
+def test_pictures_of_a_walk_need_the_extra_plots_alone(folder: Path) -> None:
+    log = str(folder / DONE / "walk.mcap")
+    commands = [["plot", log, "--out", "walk.png"], ["film", log, "--out", "film.png"]]
+    program = (
+        "sys.modules.update(dict.fromkeys(('pandas', 'pyarrow', 'duckdb')))\n"
+        f"print([main(command) for command in {commands}])"
+    )
+    assert ended(program, folder).stdout.splitlines()[-1] == str([exit_codes.OK] * len(commands))
