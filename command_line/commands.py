@@ -51,6 +51,10 @@ COMMANDS: Mapping[str, Command] = {
     "install": ("install.installation.install", "Set up the service, network and users of this computer."),
     "uninstall": ("install.installation.uninstall", "Undo the installation; configuration and logs stay."),
     "drives": (DRIVES, "Find and set up motor drives, while the daemon does not run."),
+    "calibrate": (
+        "options.studies.add_calibrate",
+        "Calibrate signs, zeros, ranges, velocity, torque and friction, while the daemon does not run.",
+    ),
     "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
     "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),
     "replay": ("logs.log_commands.replay", "Run the estimator over a recorded log."),

@@ -27,7 +27,14 @@ from experiments.study.notebook import NotebookError, count_entries, plan_in
 from experiments.study.option import OptionError, declared_options
 from experiments.study.prompt import AutomaticOperator
 from experiments.study.provenance import identity, provenance
-from experiments.study.results_folder import PAGE, make_folder, remove_unused, require_unfinished, set_aside
+from experiments.study.results_folder import (
+    USUAL,
+    ResultFiles,
+    make_folder,
+    remove_unused,
+    require_unfinished,
+    set_aside,
+)
 from experiments.study.session import Ending, Session
 from experiments.study.workers import LocalWorkers, Workers, WorkersError
 from firmware_host.configuration.file_problems import why_not
@@ -63,8 +70,9 @@ def _conduct(options: argparse.Namespace, module: ModuleType) -> int:
     typed = json.loads(json.dumps(defaults | values | simulated, default=str))
     program = identity(module.__name__)  # reads the sources before minutes of work, in which they may change
     is_new = options.out is None or not options.out.exists()
-    results = _open_folder(options, typed, getattr(module, "folder_name", lambda **_: "")(**values))
-    before = count_entries(results) if (results / PAGE).exists() else None
+    files: ResultFiles = getattr(module, "FILES", USUAL)
+    results = _open_folder(options, typed, getattr(module, "folder_name", lambda **_: "")(**values), files)
+    before = count_entries(results) if (results / files.page).exists() else None
     try:
         status = _run(options, module, partial(function, **values), results, program, typed)
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
@@ -95,7 +103,7 @@ def _chosen(options: argparse.Namespace, module: ModuleType) -> Function:
     return chosen
 
 
-def _open_folder(options: argparse.Namespace, typed: Values, name: str) -> Path:
+def _open_folder(options: argparse.Namespace, typed: Values, name: str, files: ResultFiles) -> Path:
     """Return the folder of the results: without --out a new one. Raises NotebookError, OSError.
 
     A finished study continues with options other than `typed`, such as more trials.
@@ -105,7 +113,7 @@ def _open_folder(options: argparse.Namespace, typed: Values, name: str) -> Path:
     folder: Path = options.out.resolve() if options.restart else options.out  # the working directory moves too
     if options.restart and (old := set_aside(folder)):
         print(f"the earlier results are in {old} now", file=sys.stderr)
-    require_unfinished(folder, options.name, typed)
+    require_unfinished(folder, options.name, typed, files)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 

@@ -32,6 +32,12 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
         command.set_defaults(function="experiments.studies.run_study")
 
 
+def add_calibrate(command: argparse.ArgumentParser) -> None:
+    """Add the options of the study that is a command of its own."""
+    _add_options("calibrate", command)
+    command.set_defaults(function="experiments.studies.run_study", name="calibrate")
+
+
 def _add_options(name: str, command: argparse.ArgumentParser) -> None:
     with suppress(ModuleNotFoundError):  # of an extra; the command itself says which
         module = load_study(name)

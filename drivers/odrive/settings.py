@@ -68,8 +68,8 @@ class DriveSettings:
         if self._is_due("watchdog", isfinite(self.watchdog_s), now_s) and endpoints is not None:
             for endpoint in (endpoints.enable, endpoints.timeout):
                 yield Frame(arbitration_id(node_id, codec.RX_SDO), codec.RX_SDO.encode(codec.SDO_READ, endpoint, 0))
-        # Firmware 0.5 would take this request for a new node id.
-        if self._is_due("serial number", self.identified, now_s) and self.expected_serial_number and self.supported:
+        # Older firmware would take this request for a new node id.
+        if self._is_due("serial number", bool(self.serial_number), now_s) and self._reports_serial_number:
             yield Frame(arbitration_id(node_id, codec.ADDRESS), is_remote=True)
 
     def _is_due(self, setting: str, is_known: bool, now_s: float) -> bool:
@@ -82,6 +82,10 @@ class DriveSettings:
     def identified(self) -> bool:
         """Return whether the serial number is known, or none is expected."""
         return bool(self.serial_number) or not self.expected_serial_number
+
+    @property
+    def _reports_serial_number(self) -> bool:
+        return self.supported and self.version is not None and self.version >= codec.FIRST_WITH_ADDRESS
 
     @property
     def supported(self) -> bool:

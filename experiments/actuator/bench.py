@@ -12,15 +12,14 @@ from typing import Any
 from experiments.actuator.calibration import TICK_S, Calibration
 from experiments.actuator.plan import Plan, require_possible, steps_of
 from experiments.actuator.report import Readings
-from experiments.actuator.simulation import simulated_bench
+from experiments.actuator.simulation import BuiltRobot, simulated_bench
 from experiments.actuator.weight_handling import ManualWeights
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.study.notebook import Entry, Notebook, count_entries
-from experiments.study.prompt import GO_ON, AutomaticOperator
+from experiments.study.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.study.session import Session
 from experiments.study.workers import LocalWorkers, run_parallel
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import parse_document
 
 FALLS = (
@@ -85,17 +84,26 @@ class RobotBench:
 
 @dataclass(frozen=True)
 class SimulatedBench:
-    """A simulated robot for each joint, in a process of its own."""
+    """A simulated robot for each joint, in a process of its own; one after the other where the operator practises."""
 
     configuration: Configuration
     seed: int
     session: Session
+    built: BuiltRobot | None = None  # where it differs from the configuration
+    practises: bool = False
 
     def calibrate(self, plan: Plan) -> Readings:
         require_possible(plan, self.configuration)
         folder, total = self.session.folder, len(steps_of(plan)) * len(plan.joints)
         same = {"simulated_seed": self.seed, **self.session.program}
-        joints = [partial(_simulate, self.configuration.text, joint, plan, same, folder) for joint in plan.joints]
+        built = self.built or BuiltRobot(self.configuration)
+        if self.practises:
+            operator = self.session.operator
+            return {
+                joint: _simulate(self.configuration, joint, plan, same, folder, built, operator)
+                for joint in plan.joints
+            }
+        joints = [partial(_simulate, self.configuration, joint, plan, same, folder, built) for joint in plan.joints]
 
         def show_progress() -> None:
             self.session.show(sum(count_entries(folder / joint) for joint in plan.joints), total)
@@ -108,19 +116,27 @@ class SimulatedBench:
         return sorted(self.session.folder.glob("*.mcap"))
 
 
-def _simulate(text: str, joint: str, plan: Plan, same: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    configuration = parse_configuration(text)
+def _simulate(
+    configuration: Configuration,
+    joint: str,
+    plan: Plan,
+    same: Mapping[str, Any],
+    folder: Path,
+    built: BuiltRobot,
+    prompted: Operator | None = None,
+) -> dict[str, Any]:
     notebook = Notebook(folder / joint, notebook_plan(plan, joint, configuration, same))
     logs = (folder / f"{joint}-{number}.mcap" for number in count(1))  # next to those of earlier attempts
     log = next(log for log in logs if not log.exists())
-    robot, weights = simulated_bench(configuration, joint, plan, same["simulated_seed"], log)
+    prompts = ManualWeights(prompted, plan) if prompted else None
+    robot, weights = simulated_bench(configuration, joint, plan, same["simulated_seed"], log, built, prompts)
     try:
         calibration = Calibration(
             robot=robot,
             joint=joint,
             plan=plan,
             weights=weights,
-            operator=AutomaticOperator(_discard),
+            operator=prompted or AutomaticOperator(_discard),
             notebook=notebook,
             show=_discard,
         )

@@ -9,7 +9,7 @@ from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
-from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
+from experiments.actuator.file_change import Changes, FileChangeError, changed_text, replace_file
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
 from experiments.study.session import Ending, Session
@@ -29,20 +29,30 @@ def find_target(path: Path, text: str, session: Session) -> Path:
     if read_text(path) != text:
         raise BenchError(f"the daemon does not run with {path}: name its file with --config, or restart it")
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
-        raise BenchError(f"--apply: you may not write {path}; run this as a user who may, such as root")
+        raise BenchError(f"you may not write {path}; run this as a user who may, such as root")
     return path
 
 
 def apply_fits(path: Path, fits: Sequence[JointFit], session: Session) -> tuple[str, Ending]:
     """Write the constants if the operator agrees; return a message. A failure does not cost the report."""
-    operator, before = session.operator, read_text(path)
-    changes: dict[tuple[str, ...], float] = {}
+    return apply_changes(path, fitted_changes(fits, session), session)
+
+
+def fitted_changes(fits: Sequence[JointFit], session: Session) -> dict[tuple[str, ...], Any]:
+    """Return the new values, and report the joints without any."""
+    changes: dict[tuple[str, ...], Any] = {}
     for fit in fits:
         changes |= (found := changes_of(fit.numbers))
         if not found:
             uncertainty = fit.numbers["torque_constant_error_nm_a"] / fit.numbers["torque_constant_nm_a"]
             name = f"{fit.numbers['joint']}: the standard error of k_t"
-            operator.report(f"{name} is {100.0 * uncertainty:.1f} %; k_t is not written.")
+            session.operator.report(f"{name} is {100.0 * uncertainty:.1f} %; k_t is not written.")
+    return changes
+
+
+def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, Ending]:
+    """Show the difference, write it if the operator agrees, and return a message."""
+    operator, before = session.operator, read_text(path)
     try:
         after = changed_text(before, changes)
         if after == before:

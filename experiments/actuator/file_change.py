@@ -21,7 +21,7 @@ from firmware_host.configuration.toml_records import read_text
 from logs.files.whole_files import whole_file
 
 BACKUP = ".before"
-Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value
+Changes = Mapping[tuple[str, ...], Any]  # the key's path, and its new value
 
 
 class FileChangeError(BenchError):
@@ -46,7 +46,7 @@ def changed_text(text: str, changes: Changes) -> str:
     return changed
 
 
-def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: float) -> None:
+def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: Any) -> None:
     """Put a new key below the last one of its table, above comments on the next table."""
     table = document
     for depth, name in enumerate(path[:-1]):

@@ -160,6 +160,7 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
         "repeatability": repeatability(loads),
     }
     numbers |= _offset(line, loads, empty)
+    numbers["lifted_nm"] = abs(constant_nm_a * fmean(loop.held_a for loop in loops)) if loops else nan
     return JointFit(numbers | _friction(loops, constant_nm_a, numbers["torque_constant_error_nm_a"]), loads, loops)
 
 

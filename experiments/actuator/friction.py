@@ -33,6 +33,7 @@ class Loop(NamedTuple):
     spent_a: float  # mean over the travel
     speed_rad_s: float  # the same mean
     quick: bool
+    held_a: float = nan  # mean over the travel, both ways: the weight alone, without friction and cogging
 
 
 class Friction(NamedTuple):
@@ -69,7 +70,9 @@ def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
     brisk_rad2_s = fsum(
         (b.angle_rad - a.angle_rad) ** 2 / (b.now_s - a.now_s) for a, b in pairwise(samples) if b.now_s > a.now_s
     )
-    return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick)
+    parts = [(abs(b.angle_rad - a.angle_rad), (a.current_a + b.current_a) / 2.0) for a, b in pairwise(samples)]
+    held_a = fsum(path_rad * current_a for path_rad, current_a in parts) / fsum(path_rad for path_rad, _ in parts)
+    return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick, held_a)
 
 
 def _end_rad(stroke: Sequence[Sample]) -> float:

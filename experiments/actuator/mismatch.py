@@ -35,6 +35,8 @@ def find_mismatch(
     heavy = loads[loads.torque_nm >= CONSTANT_NM]
     sign = -direction_of(heavy) if len(heavy) else (1 if current_a >= tare_a else -1)
     fitted = can_fit(heavy)
+    if not (fitted or plan.trusts_constant):
+        return None
     constant_nm_a = abs(fit_line(heavy).constant_nm_a) if fitted else configured_nm_a
     held_g = 1000.0 * sign * (current_a - tare_a) * constant_nm_a / (plan.gravity_m_s2 * plan.lever_m)
     fraction = FITTED_FRACTION if fitted else CONFIGURED_FRACTION

@@ -41,6 +41,7 @@ class Plan:
     gravity_m_s2: float = GRAVITY_M_S2
     lever_tolerance_m: float = 0.001  # by a ruler, from a hidden axle to the hook
     weight_tolerance: float = 0.001  # of class M3 (OIML R 111) from 50 g on; kitchen weights may err ten times as much
+    trusts_constant: bool = True  # False: the first weights are not compared with the configured torque constant
 
     @property
     def torque_error(self) -> float:

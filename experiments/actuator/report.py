@@ -122,6 +122,19 @@ def list_left_out(plan: Plan, readings: Readings) -> list[dict[str, Any]]:
     ]
 
 
+def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int) -> list[str]:
+    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
+    remarks = [f"{joint}: too few readings for a line" for joint in joints if joint not in directions]
+    remarks += [
+        f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
+        for joint, direction in directions.items()
+        if direction > 0 and joint.endswith("adduction")
+    ]
+    if left_out:
+        remarks.append(f"{left_out} readings are left out: see the report")
+    return remarks
+
+
 def _constant_table(fits: Sequence[JointFit]) -> Table:
     """Return one line per joint, and the paper's numbers last."""
     rows = [
@@ -158,10 +171,13 @@ def _friction_table(fits: Sequence[JointFit]) -> Table:
             "at rest at least": f"{numbers['rest_friction_nm']:.4f}",
             "offset": value_text(numbers["offset_nm"], numbers["offset_error_nm"]),
             "empty arm": value_text(numbers["tare_nm"], numbers["tare_spread_nm"]),
+            "swinging": number(numbers["lifted_nm"], 4),
         }
         for numbers, *_ in fits
     ]
-    units = dict.fromkeys(("dry friction", "at rest at least", "offset", "empty arm"), "N·m") | {"viscous": "N·m·s"}
+    units = dict.fromkeys(("dry friction", "at rest at least", "offset", "empty arm", "swinging"), "N·m") | {
+        "viscous": "N·m·s"
+    }
     return Table("friction", FRICTION_HEADING, units, DataFrame(rows), FRICTION)
 
 

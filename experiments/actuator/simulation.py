@@ -19,9 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
+from typing import NamedTuple
 
 from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
+from experiments.actuator.weight_handling import ManualWeights
 from experiments.reports.value_text import miss_text
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.prompt import GO_ON
@@ -62,27 +64,47 @@ def truth_rows(fits: Sequence[JointFit]) -> list[dict[str, str]]:
     ]
 
 
+class BuiltRobot(NamedTuple):
+    """The robot that is simulated, as opposed to the one that a configuration describes."""
+
+    configuration: Configuration
+    constant_nm_a: float = TRUE_CONSTANT_NM_A  # of its motors; its drives believe in the configured one
+
+
 def simulated_bench(
-    configuration: Configuration, joint: str, plan: Plan, seed: int, log: Path
+    configuration: Configuration,
+    joint: str,
+    plan: Plan,
+    seed: int,
+    log: Path,
+    built: BuiltRobot | None = None,
+    prompts: ManualWeights | None = None,
 ) -> tuple[LockstepRobot, SimulatedWeights]:
-    """Make a robot with a flipper over the bench's edge, and the handler of its weights. `log` must be new."""
+    """Make a robot with a flipper over the bench's edge, and the handler of its weights.
+
+    `log` must be new. With `prompts` the weights wait for their answers.
+    """
+    built = built or BuiltRobot(configuration)
     random = Random(f"bench {seed} {joint}")
     recorder = FileRecorder(log, configuration)
-    plant = plant_of(configuration, fixed_base=True, joint_coulomb_nm=COULOMB_NM)
+    plant = plant_of(built.configuration, fixed_base=True, joint_coulomb_nm=COULOMB_NM)
     drives = {
         name: drives_of(
-            configuration,
-            torque_constant_error=TRUE_CONSTANT_NM_A / drive.torque_constant_nm_a - 1.0,
+            built.configuration,
+            torque_constant_error=built.constant_nm_a / drive.torque_constant_nm_a - 1.0,
             cogging_nm=COGGING_NM,
             cogging_per_turn=COGGING_PER_TURN,
             cogging_phase_deg=random.uniform(-180.0, 180.0),
             current_noise_a=CURRENT_NOISE_A,
             encoder_noise_rad=ENCODER_NOISE_RAD,
         )[name]
-        for name, drive in configuration.drive.items()
+        for name, drive in built.configuration.drive.items()
     }
     lockstep = Lockstep(configuration, paper_track(), seed, recorder, plant=plant, drives=drives)
-    return LockstepRobot(lockstep, recorder), SimulatedWeights(lockstep, joint, plan, seed)
+    weights = SimulatedWeights(lockstep, joint, plan, seed)
+    if prompts:
+        weights = PractisedWeights(lockstep, joint, plan, seed, prompts)
+    return LockstepRobot(lockstep, recorder), weights
 
 
 class SimulatedWeights:
@@ -127,3 +149,27 @@ class SimulatedWeights:
 
     def take_off(self) -> None:
         self.mount.take_off()
+
+
+class PractisedWeights(SimulatedWeights):
+    """SimulatedWeights of an operator who practises: they do what each prompt asks for, once it is answered."""
+
+    def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int, prompts: ManualWeights) -> None:
+        super().__init__(lockstep, joint, plan, seed)
+        self._prompts = prompts
+
+    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+        super().hold_level(joint, meanwhile)
+        self._prompts.hold_level(joint, meanwhile)
+
+    def release(self, meanwhile: Callable[[], None]) -> None:
+        self._prompts.release(meanwhile)
+        super().release(meanwhile)
+
+    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+        answer = self._prompts.hang(step, meanwhile)
+        return super().hang(step, meanwhile) if answer == GO_ON else answer
+
+    def take_off(self) -> None:
+        self._prompts.take_off()
+        super().take_off()

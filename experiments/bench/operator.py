@@ -4,20 +4,18 @@ No drive knows on which joint it is mounted: its angle, torque and current agree
 operator's eyes and hands are needed once. The simulated operator observes the mechanics and not the drives.
 """
 
-from collections import deque
 from collections.abc import Callable
 from enum import Enum
 from math import radians
 
 from control.controller import UP_RAD
-from control.rate import PERIOD_S
 from experiments.bench.rig import SimulatedRig
+from experiments.bench.simulated_hand import SimulatedHand
 from experiments.robot.bench_robot import CLEAR, LEAVE
 from experiments.study.prompt import GO_ON, Operator
 from simulation.body.plant import END_STOPS_RAD
 
 MOTIONS = {"sweep": "swing forward", "adduction": "rise"}
-TURNING_S = 0.25  # for a simulated hand, from the middle to a stop
 SEEN_RAD = radians(4.0)  # visible motion
 
 
@@ -128,10 +126,7 @@ class SimulatedBenchOperator(BenchOperator):
         self._plant = rig.robot.plant
         self._joints = rig.configuration.rig.joints
         self._from_rad = self._farthest_rad = self._plant.angles_rad
-        self._held_rad: list[float] | None = None
-        self._turning = 0  # index of the joint that is turned along the profile
-        self._profile: deque[float] = deque()
-        rig.others.append(lambda _: self._hold())
+        self._hand = SimulatedHand(rig)
 
     def allows_unknown_watchdogs(self, what: str, meanwhile: Callable[[], None]) -> bool:
         return True
@@ -152,30 +147,17 @@ class SimulatedBenchOperator(BenchOperator):
         return Observation.RIGHT if moved_rad[seen[0]] > 0.0 else Observation.OPPOSITE
 
     def hold_level(self, meanwhile: Callable[[], None]) -> bool:
-        self._held_rad = [0.0] * len(self._joints)
+        self._hand.hold([0.0] * len(self._joints))
         return True
 
     def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
-        self._held_rad = [0.0, UP_RAD] * len(self._plant.arms)
-        self._turning = self._joints.index(joint)
-        stop_rad = END_STOPS_RAD[self._turning % 2]
-        steps = round(TURNING_S / PERIOD_S)
-        there_and_back = (*range(0, -steps, -1), *range(-steps, steps), *range(steps, -1, -1))
-        self._profile.extend(stop_rad * step / steps for step in there_and_back)
-        while self._profile:
+        self._hand.hold([0.0, UP_RAD] * len(self._plant.arms))
+        index = self._joints.index(joint)
+        for angle_rad in (-END_STOPS_RAD[index % 2], END_STOPS_RAD[index % 2], 0.0):
+            self._hand.turn(index, angle_rad)
+        while self._hand.is_turning:
             meanwhile()
         return True
 
     def release_flippers(self) -> None:
-        self._held_rad = None
-        for arm in self._plant.arms:
-            arm.put_back()
-
-    def _hold(self) -> None:
-        if self._held_rad is None:
-            return
-        if self._profile:
-            self._held_rad[self._turning] = self._profile.popleft()
-        for number, arm in enumerate(self._plant.arms):
-            arm.sweep_rad, arm.adduction_rad = self._held_rad[2 * number : 2 * number + 2]
-            arm.sweep_velocity_rad_s = arm.adduction_velocity_rad_s = 0.0
+        self._hand.release()

@@ -191,3 +191,14 @@ def check_quiet_buses(test_rig: TestRig) -> Readings:
 
 def _trouble(port: CanPort) -> int:
     return port.error_frames + port.lost_frames + port.failed_sends
+
+
+CHECKS = (
+    check_ids,
+    check_unknown_ids,
+    check_message_rates,
+    check_bus_loads,
+    check_firmware,
+    check_watchdogs,
+    check_quiet_buses,
+)

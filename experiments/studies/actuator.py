@@ -5,7 +5,6 @@ its own, so that a finished joint stays as it is when another one continues.
 """
 
 from argparse import ArgumentTypeError
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,9 +13,9 @@ from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import JOINTS
 from experiments.actuator.bench import RobotBench, SimulatedBench
 from experiments.actuator.configuration_change import apply_fits, find_target
-from experiments.actuator.fit import JointFit, fit_joint
+from experiments.actuator.fit import fit_joint
 from experiments.actuator.plan import PAPER_TRIALS, PAPER_WEIGHTS_G, Plan
-from experiments.actuator.report import list_left_out, make_result
+from experiments.actuator.report import list_left_out, list_remarks, make_result
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.study.option import Option
@@ -89,16 +88,3 @@ def study(
     notes = [*list_remarks(plan.joints, fits, len(list_left_out(plan, readings))), *filter(None, [applied])]
     result = make_result(plan, readings, fits, applied or None, session.simulated)
     return replace(result, notes=notes, logs=logs, ending=ending)
-
-
-def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int) -> list[str]:
-    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
-    remarks = [f"{joint}: too few readings for a line" for joint in joints if joint not in directions]
-    remarks += [
-        f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
-        for joint, direction in directions.items()
-        if direction > 0 and joint.endswith("adduction")
-    ]
-    if left_out:
-        remarks.append(f"{left_out} readings are left out: see the report")
-    return remarks

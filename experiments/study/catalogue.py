@@ -23,6 +23,9 @@ class FoundStudy(NamedTuple):
     text: str  # the docstring
 
 
+OWN_COMMANDS = ("calibrate",)  # which 'mudskipper' has itself, not 'mudskipper experiment'
+
+
 @cache
 def find_studies() -> dict[str, FoundStudy]:
     """Return every study by the name of its command."""
@@ -37,8 +40,8 @@ def find_studies() -> dict[str, FoundStudy]:
 
 
 def study_texts() -> dict[str, str]:
-    """Return the docstring of every study by the name of its command."""
-    return {name: found.text for name, found in find_studies().items()}
+    """Return the docstring of every study of 'mudskipper experiment' by the name of its command."""
+    return {name: found.text for name, found in find_studies().items() if name not in OWN_COMMANDS}
 
 
 def load_study(name: str) -> ModuleType:

@@ -18,7 +18,7 @@ from matplotlib import rc_context
 
 from experiments.reports.style import STYLE
 from experiments.study.result import Figure, Result, Rows, Table, to_json
-from experiments.study.results_folder import PAGE, RESULTS, SUMMARY
+from experiments.study.results_folder import RESULTS
 from firmware_host.software_version import software_version
 from logs.files.whole_files import whole_file
 
@@ -56,8 +56,9 @@ def write_result(
     `measured` are the rows of the study with their measurements.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = [folder / SUMMARY]
-    _write(folder / SUMMARY, json_pieces(summary))
+    page, numbers = folder / result.files.page, folder / result.files.summary
+    written = [numbers]
+    _write(numbers, json_pieces(summary))
     if measured:
         with whole_file(folder / RESULTS) as hidden:
             _flat(pd.concat(measured, ignore_index=True)).to_parquet(hidden)
@@ -66,8 +67,8 @@ def write_result(
         watch("pictures drawn", done, len(result.figures))
         written += _draw(figure, folder)
         gc.collect()  # the parts of a picture refer to each other: the next one shall not stand next to them in memory
-    _write(folder / PAGE, (f"{line}\n" for line in _page(folder, result)))
-    return [folder / PAGE, *written, *result.logs]
+    _write(page, (f"{line}\n" for line in _page(folder, result)))
+    return [page, *written, *result.logs]
 
 
 def _write(path: Path, pieces: Iterable[str]) -> None:
@@ -129,7 +130,7 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
                 yield _table(part) if isinstance(part, Table) else _figure(part, folder)
     yield from (f"<p>{escape(note)}</p>" for note in result.notes)
     logs = f"Logs: {', '.join(escape(log.name) for log in result.logs)}." if result.logs else ""
-    yield f"<footer>Numbers: {SUMMARY}. {logs}</footer>\n</body></html>"
+    yield f"<footer>Numbers: {result.files.summary}. {logs}</footer>\n</body></html>"
 
 
 def _table(table: Table) -> str:

@@ -11,6 +11,7 @@ from pandas import DataFrame
 
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table as aligned
+from experiments.study.results_folder import USUAL, ResultFiles
 from experiments.study.session import Ending
 
 Rows = list[list[str]]  # the head first
@@ -59,6 +60,7 @@ class Result:
     notes: Sequence[str] = ()  # sentences below the tables
     logs: Sequence[Path] = ()
     ending: Ending = Ending.DONE
+    files: ResultFiles = USUAL
 
     def text(self) -> str:
         """Return all tables and notes for a screen."""

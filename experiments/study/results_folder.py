@@ -8,12 +8,22 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments.study.notebook import NAME, NotebookError, count_entries
 from experiments.study.provenance import program_text
 
 PAGE, SUMMARY, RESULTS = "report.html", "summary.json", "results.parquet"
+
+
+class ResultFiles(NamedTuple):
+    """The names of the page and of the numbers of a study."""
+
+    page: str = PAGE
+    summary: str = SUMMARY
+
+
+USUAL = ResultFiles()
 
 
 def make_folder(name: str) -> Path:
@@ -36,19 +46,19 @@ def _numbered(path: Path) -> Iterator[Path]:
     return (path.with_name(path.name + (f"-{number}" if number > 1 else "")) for number in count(1))
 
 
-def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any]) -> None:
+def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any], files: ResultFiles = USUAL) -> None:
     """Raises NotebookError for results of another experiment, and for a finished one.
 
     One that was finished with other options, such as fewer trials, may continue: its notebook decides.
     """
     summary: dict[str, Any] = {}
     with suppress(OSError, ValueError):
-        summary = dict(json.loads((folder / SUMMARY).read_bytes()))
+        summary = dict(json.loads((folder / files.summary).read_bytes()))
     earlier = summary.get("experiment", experiment)
     if earlier != experiment:
         raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
     record = summary.get("provenance", {})
-    if (folder / PAGE).exists() and options == record.get("options", options):
+    if (folder / files.page).exists() and options == record.get("options", options):
         raise NotebookError(
             f"{folder} has a finished experiment {experiment}, of {record.get('date', 'an unknown date')} by "
             f"{program_text(record)}: choose another folder with --out, or begin again with --restart, which renames "

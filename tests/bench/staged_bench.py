@@ -11,14 +11,13 @@ from typing import Any, Concatenate, ParamSpec
 import pytest
 
 from command_line.experiments.terminal_prompt import TerminalPrompt
-from experiments.bench.lateness import Lateness
+from experiments.bench.measured_check import UnfinishedCheckError, measure_check
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_errors import BenchError, EndedError
+from experiments.robot.bench_errors import EndedError
 from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")
-MOST_MEASURED = 3  # attempts for one claim
 P = ParamSpec("P")
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
 
@@ -159,29 +158,20 @@ class StagedBench:
         A check that late ticks or messages may have disturbed is repeated, and the report lists the first result; if
         they occur again, the failure says so.
         """
-        for left in reversed(range(MOST_MEASURED)):
-            readings = self._readings(measure(self.test_rig, *arguments, **named))
-            late = self.test_rig.lateness.message
-            wrong = [reading.message for reading in readings if not reading.good]
-            if not (wrong and late and left):
-                break
-            self.report.note_repeat(" ".join([*wrong, late]))
+        try:
+            measured = measure_check(self.test_rig, measure, *arguments, **named)
+        except UnfinishedCheckError as problem:
+            self._add(problem.readings)
+            raise
+        for repeat in measured.repeats:
+            self.report.note_repeat(repeat)
+        self._add(measured.readings)
+        if measured.problem:
+            pytest.fail(measured.problem, pytrace=False)
+
+    def _add(self, readings: Iterable[Reading]) -> None:
         for reading in readings:
             self.report.add(reading)
-        if wrong:
-            pytest.fail("\n".join([*wrong, late]).rstrip(), pytrace=False)
-
-    def _readings(self, measured: Readings) -> list[Reading]:
-        self.test_rig.lateness = Lateness()
-        reported: list[Reading] = []
-        try:
-            for reading in measured:
-                reported.append(reading)
-        except BenchError as problem:
-            for reading in reported:
-                self.report.add(reading)
-            raise BenchError(f"{problem} {self.test_rig.lateness.message}".rstrip()) from None
-        return reported
 
 
 class UncapturedOperator:

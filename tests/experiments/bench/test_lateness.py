@@ -11,6 +11,7 @@ from control.modes import Request
 from control.records import DriveState, DriveStates, same_for_all
 from experiments.bench.joint_zero_check import check_rest_pose
 from experiments.bench.lateness import LATE_S
+from experiments.bench.measured_check import MOST_MEASURED
 from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.rig import SimulatedRig
@@ -24,7 +25,7 @@ from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.harness.blocks import on_blocks
 from simulation.harness.peer import track_of
 from simulation.harness.world import World
-from tests.bench.staged_bench import MOST_MEASURED, BenchReport, StagedBench
+from tests.bench.staged_bench import BenchReport, StagedBench
 from tests.experiments.bench.late_rig import LateRig
 
 

@@ -1,0 +1,61 @@
+"""The hands of an operator at a simulated robot: they hold all joints, and turn one of them at a steady speed."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil
+
+from control.rate import PERIOD_S
+from experiments.bench.rig import SimulatedRig
+
+SPEED_RAD_S = 7.0
+HELD_KG_M2 = 1e6  # inertia of a held joint: its own weight and its motor do not move it
+
+
+class SimulatedHand:
+    """Owns where the joints are held."""
+
+    def __init__(self, rig: SimulatedRig) -> None:
+        self._arms = rig.robot.plant.arms
+        self._free = [arm.parameters for arm in self._arms]
+        self._held_rad: list[float] = []  # empty: not held
+        self._index = 0  # of the joint that is turned
+        self._path_rad: deque[float] = deque()
+        rig.others.append(lambda _: self._hold())
+
+    @property
+    def is_turning(self) -> bool:
+        return bool(self._path_rad)
+
+    def hold(self, angles_rad: Sequence[float]) -> None:
+        self._held_rad = list(angles_rad)
+        for arm in self._arms:
+            heavy = replace(arm.parameters.arm_mass, sweep_inertia_kg_m2=HELD_KG_M2, adduction_inertia_kg_m2=HELD_KG_M2)
+            arm.parameters = replace(arm.parameters, arm_mass=heavy)
+
+    def turn(self, index: int, angle_rad: float) -> None:
+        """Turn a held joint to an angle, in the ticks that follow."""
+        from_rad = self._path_rad[-1] if self._path_rad else self._held_rad[index]
+        steps = max(1, ceil(abs(angle_rad - from_rad) / (SPEED_RAD_S * PERIOD_S)))
+        self._index = index
+        self._path_rad.extend(from_rad + (angle_rad - from_rad) * step / steps for step in range(1, steps + 1))
+
+    def release(self) -> None:
+        """Let go: the flippers lie down."""
+        self._held_rad = []
+        for arm, free in zip(self._arms, self._free, strict=True):
+            arm.parameters = free
+            arm.put_back()
+
+    def _hold(self) -> None:
+        if not self._held_rad:
+            return
+        velocities_rad_s = [0.0] * len(self._held_rad)
+        if self._path_rad:
+            next_rad = self._path_rad.popleft()
+            velocities_rad_s[self._index] = (next_rad - self._held_rad[self._index]) / PERIOD_S
+            self._held_rad[self._index] = next_rad
+        for number, arm in enumerate(self._arms):
+            own = slice(2 * number, 2 * number + 2)
+            arm.sweep_rad, arm.adduction_rad = self._held_rad[own]
+            arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s = velocities_rad_s[own]

@@ -1,0 +1,33 @@
+"""The drives that are found on the buses: where they are, what they are, and their own numbers."""
+
+from control.rate import PERIOD_S
+from experiments.bench.measured_check import measure_check
+from experiments.bench.test_rig import TestRig
+from experiments.bench.wiring_check import ASKING_S, CHECKS
+from experiments.robot.bench_errors import BenchError
+
+Identities = dict[str, dict[str, str | int]]  # by joint
+
+
+def identify_drives(test_rig: TestRig) -> Identities:
+    """Check the wiring, and return every drive. Raises BenchError with all that is wrong."""
+    problems = [measure_check(test_rig, check).problem for check in CHECKS]
+    if any(problems):
+        raise BenchError("\n".join(filter(None, problems)))
+    numbered = [drive.reports_settings and drive.serial_digits for drive in test_rig.configuration.drive.values()]
+    for _ in range(round(ASKING_S / PERIOD_S)):
+        health = {each.joint: each for each in test_rig.drives.health}
+        if all(each.serial_number or not own for each, own in zip(health.values(), numbered, strict=True)):
+            break
+        test_rig.tick_checked()
+    return {
+        joint: {
+            "bus": drive.bus,
+            "node_id": drive.node_id,
+            "type": drive.type,
+            "model": getattr(drive, "model", ""),
+            "serial_number": health[joint].serial_number,
+            "firmware": health[joint].firmware,
+        }
+        for joint, drive in test_rig.configuration.drive.items()
+    }

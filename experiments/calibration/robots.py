@@ -1,0 +1,157 @@
+"""The robot that is calibrated: a real one, or a simulated one that was built with errors to be found.
+
+Hands and tiny torques use the buses in this process, as the bench does. Weights hang for minutes on a motor that must
+not let go while a disk or a terminal stalls, so they use a daemon, which this program starts on the same buses.
+"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from random import Random
+from typing import Any, NamedTuple, Protocol
+
+from experiments.actuator.bench import RobotBench, SimulatedBench
+from experiments.actuator.file_change import Changes, changed_text
+from experiments.actuator.plan import Plan
+from experiments.actuator.report import Readings
+from experiments.actuator.simulation import BuiltRobot
+from experiments.bench.operator import PromptedBenchOperator
+from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
+from experiments.bench.simulated_hand import SimulatedHand
+from experiments.bench.test_rig import TestRig
+from experiments.calibration.hand_steps import Hand
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.daemon_robot import DaemonRobot
+from experiments.study.session import Session
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from operator_client.status_client import NoDaemonError, StatusClient
+from simulation.harness.blocks import on_blocks
+from simulation.harness.local_setup import named_folder
+
+STARTING_S, ENDING_S, POLL_S = 10.0, 20.0, 0.1
+FILE = "mudskipper.toml"  # of the daemon that holds the weights
+
+
+class OpenedRobot(NamedTuple):
+    test_rig: TestRig
+    hand: Hand
+
+
+class CalibratedRobot(Protocol):
+    def open(self, configuration: Configuration) -> AbstractContextManager[OpenedRobot]:
+        """Open the robot's buses, with a loop that believes in a configuration. Raises BenchError."""
+
+    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+        """Return the readings of the weights, and the logs."""
+
+
+class OperatorsHand:
+    """The hand of a person, who turns the joint before answering."""
+
+    is_turning = False
+
+    def hold(self, angles_rad: Sequence[float]) -> None: ...
+
+    def turn(self, index: int, angle_rad: float) -> None: ...
+
+    def release(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class RealRobot:
+    session: Session
+
+    @contextmanager
+    def open(self, configuration: Configuration) -> Iterator[OpenedRobot]:
+        with _test_rig(HardwareRig(configuration), self.session) as test_rig:
+            for warning in test_rig.rig.warnings:
+                self.session.operator.report(f"warning: {warning}")
+            yield OpenedRobot(test_rig, OperatorsHand())
+
+    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+        with running_daemon(configuration, self.session.folder) as socket:
+            bench = RobotBench(DaemonRobot(socket), self.session)
+            try:
+                readings = bench.calibrate(plan)
+            finally:
+                logs = bench.leave()
+        return readings, logs
+
+
+@contextmanager
+def running_daemon(configuration: Configuration, folder: Path) -> Iterator[Path]:
+    """Run a daemon with this configuration, and yield its socket. Raises BenchError where it does not start."""
+    socket = named_folder("calibration") / "mudskipper.sock"
+    paths: Changes = {("status", "socket"): str(socket), ("log", "directory"): str((folder / "logs").absolute())}
+    path, messages = folder / FILE, folder / "mudskipperd.txt"
+    path.write_text(changed_text(configuration.text, paths), encoding="utf-8")
+    command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
+    with messages.open("wb") as output:  # Ctrl-C is for this program: the daemon's weight is taken off first
+        daemon = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+    try:
+        _wait_for(daemon, socket, messages)
+        yield socket
+    finally:
+        daemon.terminate()
+        daemon.wait(ENDING_S)
+
+
+def _wait_for(daemon: subprocess.Popen[bytes], socket: Path, messages: Path) -> None:
+    for _ in range(round(STARTING_S / POLL_S)):
+        if daemon.poll() is not None:
+            break
+        with suppress(NoDaemonError):
+            StatusClient(socket).close()
+            return
+        time.sleep(POLL_S)
+    reported = messages.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["it reports nothing"]
+    raise BenchError(f"the daemon that holds the weights did not start: {reported[-1]}")
+
+
+@dataclass(frozen=True)
+class SimulatedRobot:
+    session: Session
+    built: BuiltRobot
+    seed: int
+    practises: bool = False  # a person answers the prompts, and the simulated hands do what they ask for
+
+    @contextmanager
+    def open(self, configuration: Configuration) -> Iterator[OpenedRobot]:
+        built, constant_nm_a = self.built
+        drives = {
+            joint: replace(drive, torque_constant_error=constant_nm_a / drive.torque_constant_nm_a - 1.0)
+            for joint, drive in on_blocks(built).drives(built).items()
+        }
+        rig = SimulatedRig(configuration, built, drives, self.seed)
+        with _test_rig(rig, self.session) as test_rig:
+            yield OpenedRobot(test_rig, SimulatedHand(rig))
+
+    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+        bench = SimulatedBench(configuration, self.seed, self.session, self.built, self.practises)
+        return bench.calibrate(plan), bench.leave()
+
+
+@contextmanager
+def _test_rig(rig: Rig, session: Session) -> Iterator[TestRig]:
+    test_rig = TestRig(rig, PromptedBenchOperator(session.operator, sure=False))
+    try:
+        yield test_rig
+    finally:
+        test_rig.force_idle()
+        rig.close()
+
+
+def build_with_errors(configuration: Configuration, seed: int) -> BuiltRobot:
+    """Return a robot with one joint's sign, another's zero, and all torque constants other than configured."""
+    random = Random(f"built {seed}")
+    signed, shifted = random.sample(configuration.rig.joints, 2)
+    changes: dict[tuple[str, ...], Any] = {
+        ("drive", signed, "sign"): -configuration.drive[signed].sign,
+        ("drive", shifted, "zero_turn"): round(random.choice((-1, 1)) * random.uniform(0.03, 0.1), 3),
+    }
+    return BuiltRobot(parse_configuration(changed_text(configuration.text, changes)))

@@ -1,0 +1,61 @@
+"""The calibration of a robot, joint by joint: what answers on the buses, then hands, tiny torques and weights.
+
+Hands come first, without torque: only with the right signs, zeros and velocities may a motor pull. Every step is in the
+notebook of the folder, which belongs to this configuration and these drives.
+"""
+
+from getpass import getuser
+from pathlib import Path
+from typing import Annotated
+
+from control.records import JOINTS
+from experiments.actuator.configuration_change import find_target
+from experiments.actuator.plan import Plan, require_possible
+from experiments.actuator.simulation import bench_configuration
+from experiments.calibration.calibration import Calibration
+from experiments.calibration.report import FILES as FILES
+from experiments.calibration.robots import CalibratedRobot, RealRobot, SimulatedRobot, build_with_errors
+from experiments.studies.actuator import INSTALLED, Lever, Weights
+from experiments.study.option import Option
+from experiments.study.result import Result
+from experiments.study.session import Session
+from firmware_host.configuration.loading import load_configuration
+
+HAS_ROBOT = False  # no daemon's, at its socket
+WEIGHTS_G, TRIALS = (100.0, 200.0, 400.0), 2  # within the default limits.torque_nm at 12 cm
+
+
+def study(
+    session: Session,
+    *,
+    config: Annotated[Path | None, Option(f"of the robot, to change (default: {INSTALLED})")] = None,
+    joint: Annotated[tuple[str, ...], Option("to calibrate (default: all)", choices=JOINTS)] = (),
+    operator: Annotated[str | None, Option("of the record (default: this user)")] = None,
+    lever: Lever = None,
+    lever_tolerance: Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")] = 1.0,
+    weights: Weights = WEIGHTS_G,
+    weight_tolerance: Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")] = 0.1,
+    trials: Annotated[int, Option("passes through them", low=1, high=100)] = TRIALS,
+    practise: Annotated[bool, Option("on a simulated robot whose errors are to be found; its hands obey")] = False,
+    seed: Annotated[int, Option("of the simulated robot")] = 1,
+) -> Result:
+    """Signs, zeros, ranges, velocity, torque and friction of every joint, with hands and weights."""
+    session = session._replace(simulated=session.simulated or practise)
+    is_bench = session.simulated and not config
+    configuration = bench_configuration() if is_bench else load_configuration(config or INSTALLED)
+    target = find_target(config or INSTALLED, configuration.text, session)
+    joints = joint or configuration.rig.joints
+    plan = Plan(
+        joints=tuple(dict.fromkeys(joints)),
+        weights_g=weights,
+        trials=trials,
+        lever_m=lever / 100.0 if lever else configuration.geometry.flipper_length_m,
+        lever_tolerance_m=lever_tolerance / 1000.0,
+        weight_tolerance=weight_tolerance / 100.0,
+        trusts_constant=False,
+    )
+    require_possible(plan, configuration)
+    robot: CalibratedRobot = RealRobot(session)
+    if session.simulated:
+        robot = SimulatedRobot(session, build_with_errors(configuration, seed), seed, practise)
+    return Calibration(session, robot, configuration, plan).run(operator or getuser(), target)
