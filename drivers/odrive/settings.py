@@ -68,8 +68,9 @@ class DriveSettings:
         if self._is_due("watchdog", isfinite(self.watchdog_s), now_s) and endpoints is not None:
             for endpoint in (endpoints.enable, endpoints.timeout):
                 yield Frame(arbitration_id(node_id, codec.RX_SDO), codec.RX_SDO.encode(codec.SDO_READ, endpoint, 0))
-        # Older firmware would take this request for a new node id.
-        if self._is_due("serial number", bool(self.serial_number), now_s) and self._reports_serial_number:
+        # Older firmware would take this request for a new node id. A known one is checked where another is expected.
+        is_wanted = self._reports_serial_number and (self.expected_serial_number or not self.serial_number)
+        if self._is_due("serial number", bool(self.serial_number), now_s) and is_wanted:
             yield Frame(arbitration_id(node_id, codec.ADDRESS), is_remote=True)
 
     def _is_due(self, setting: str, is_known: bool, now_s: float) -> bool:

@@ -4,6 +4,7 @@ Hands come first, without torque: only with the right signs, zeros and velocitie
 notebook of the folder, which belongs to this configuration and these drives.
 """
 
+from dataclasses import replace
 from getpass import getuser
 from pathlib import Path
 from typing import Annotated
@@ -58,4 +59,5 @@ def study(
     robot: CalibratedRobot = RealRobot(session)
     if session.simulated:
         robot = SimulatedRobot(session, build_with_errors(configuration, seed), seed, practise)
-    return Calibration(session, robot, configuration, plan).run(operator or getuser(), target)
+    result = Calibration(session, robot, configuration, plan).run(operator or getuser(), target)
+    return replace(result, title=f"{result.title} (practised)") if practise else result

@@ -13,7 +13,7 @@ from control.rate import PERIOD_S
 from control.records import Joints
 from drivers.can.frames import Frame
 from drivers.drive import WatchdogEndpoints
-from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message
+from drivers.odrive.codec import ADDRESS, GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message
 from drivers.odrive.settings import REFRESH_S
 from tests.drivers.odrive.odrive_bench import PARAMETERS, OdriveBench
 
@@ -258,6 +258,7 @@ def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Benc
 
 def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench) -> None:
     bench.report(GET_VERSION, *PRO)
+    bench.report(ADDRESS, 0, 1, 2)
     bench.report_setting(BUILD.enable, "01")
     bench.report_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)

@@ -89,7 +89,7 @@ class ScriptedJoint:
         return {"current_a": current_a, "rest_friction_a": 0.0, "angle_rad": 0.0}
 
 
-LOOP = Loop(0.18, 0.2, quick=False)
+LOOP = Loop(0.18, 0.2, quick=False, held_a=0.6)
 
 
 class Case:

@@ -1,0 +1,48 @@
+"""`mudskipper calibrate`, from the command to the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from experiments.actuator.simulation import TRUE_CONSTANT_NM_A
+from firmware_host.configuration.loading import load_configuration
+
+COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
+
+
+def test_one_command_finds_what_a_simulated_robot_was_built_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [*COMMAND, "--operator", "Ada", "--out", str(tmp_path)]
+    assert main([*command, "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert report == json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    (joint,), (hands,) = report["joints"], report["hands"]
+    assert joint["torque_constant_nm_a"] == pytest.approx(TRUE_CONSTANT_NM_A, rel=0.02)
+    assert (report["operator"], hands["sign"]) == ("Ada", -1)  # by the robot of the default seed
+    drive = load_configuration(tmp_path / "mudskipper.toml").drive["right_adduction"]
+    assert drive.sign == -1 and drive.torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)
+    assert "by Ada" in (tmp_path / "calibration.html").read_text(encoding="utf-8")
+    assert main(command) == exit_codes.REFUSED  # it is finished
+
+
+def test_a_person_must_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", (tmp_path / "empty").open("w+"))
+    command = ["calibrate", "--practise", "--joint", "left_sweep", "--out", str(tmp_path / "out")]
+    assert main(command) == exit_codes.REFUSED
+    assert (tmp_path / "out" / "notebook.jsonl").exists()
+
+
+@pytest.mark.parametrize("wrong", [["--joint", "middle_sweep"], ["--weights", "100"], ["--config", "nowhere.toml"]])
+def test_wrong_input_is_refused_before_anything_moves(tmp_path: Path, wrong: list[str]) -> None:
+    command = ["calibrate", *wrong, "--out", str(tmp_path / "out")]
+    try:
+        status = main(command)
+    except SystemExit as ended:
+        status = int(ended.code or 0)
+    assert status in (exit_codes.USAGE, exit_codes.UNHEALTHY) and not list(tmp_path.rglob("notebook.jsonl"))

@@ -1,0 +1,142 @@
+"""A calibration continues after an interruption at any prompt, and belongs to its configuration and drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.actuator.configuration_change import find_target
+from experiments.actuator.file_change import changed_text
+from experiments.actuator.friction import Loop
+from experiments.actuator.plan import Plan, steps_of
+from experiments.actuator.report import Readings
+from experiments.actuator.simulation import BuiltRobot
+from experiments.calibration.calibration import Calibration
+from experiments.calibration.robots import SimulatedRobot, running_daemon
+from experiments.robot.bench_errors import EndedError
+from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.study.notebook import NotebookError
+from experiments.study.result import Result
+from experiments.study.session import Session
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from operator_client.status_client import StatusClient
+from tests.running_bench import Bench
+from tests.scripted_operator import ScriptedOperator
+
+JOINT = "right_adduction"
+PLAN = Plan((JOINT,), weights_g=(200.0, 400.0), trials=2, trusts_constant=False)
+CONFIGURATION = simulated_configuration()
+TRUE_NM_A = 0.065
+LOOPS = [Loop(0.2, 0.2, quick, 0.8)._asdict() for quick in (False, False, True, True)]
+
+
+class WeighedRobot(SimulatedRobot):
+    """A simulated robot whose weights are read without an error, and without the minutes that they take."""
+
+    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+        self.session.operator.ask("weights", {"": "done"}, lambda: None)
+        entries = {
+            step.key: {
+                "current_a": plan.torque_nm(step.weight_g) / TRUE_NM_A + 0.8,
+                "rest_friction_a": 0.1,
+                "angle_rad": 0.0,
+                "loops": LOOPS,
+            }
+            for step in steps_of(plan)
+        }
+        return {JOINT: entries}, []
+
+
+class InterruptedOperator(ScriptedOperator):
+    """Presses Ctrl-C at one prompt."""
+
+    def __init__(self, at: int) -> None:
+        super().__init__()
+        self._at = at
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        if len(self.asked) == self._at:
+            raise KeyboardInterrupt
+        return super().ask(question, answers, meanwhile)
+
+
+@dataclass
+class Case:
+    folder: Path
+    truth: Mapping[tuple[str, ...], Any]
+
+    def run(self, operator: ScriptedOperator) -> Result:
+        session = Session(self.folder, operator, lambda done, total: None, simulated=True)
+        built = BuiltRobot(parse_configuration(changed_text(CONFIGURATION.text, self.truth)), TRUE_NM_A)
+        calibration = Calibration(session, WeighedRobot(session, built, 1), CONFIGURATION, PLAN)
+        return calibration.run("Ada", find_target(self.folder, CONFIGURATION.text, session))
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Case:
+    return Case(tmp_path, {("drive", JOINT, "sign"): -1, ("drive", JOINT, "serial_number"): "3854345a3133"})
+
+
+def changed(case: Case) -> Configuration:
+    return parse_configuration((case.folder / "mudskipper.toml").read_text(encoding="utf-8"))
+
+
+def test_nothing_is_lost_by_an_interruption_at_any_prompt(case: Case, tmp_path: Path) -> None:
+    """Level, both ends, torque, weights, difference; only the interrupted prompt, and its joint's, are asked again."""
+    whole = ScriptedOperator()
+    expected = case.run(whole).json()
+    assert len(whole.asked) == 6
+    for at in count():
+        again = replace(case, folder=tmp_path / f"at-{at}")
+        again.folder.mkdir()
+        interrupted, operator = InterruptedOperator(at), ScriptedOperator()
+        try:
+            again.run(interrupted)
+        except KeyboardInterrupt:
+            assert again.run(operator).json()["hands"] == expected["hands"]
+            assert len(interrupted.asked) + len(operator.asked) in (6, 7, 8)
+            assert changed(again).drive == changed(case).drive
+        else:
+            assert at == 6
+            break
+
+
+def test_the_configuration_gets_what_was_found(case: Case) -> None:
+    result = case.run(ScriptedOperator())
+    drive = changed(case).drive[JOINT]
+    assert drive.sign == -1
+    assert drive.torque_constant_nm_a == pytest.approx(TRUE_NM_A, rel=0.01)
+    assert changed(case).arm.arm_mass_kg == pytest.approx(0.8 * TRUE_NM_A / (9.81 * 0.06), rel=0.01)
+    numbers = result.json()
+    assert numbers["operator"] == "Ada" and numbers["drives"][JOINT]["serial_number"] == "3854345a3133"
+
+
+def test_another_drive_is_no_continuation(case: Case) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        case.run(InterruptedOperator(3))
+    other = replace(case, truth={**case.truth, ("drive", JOINT, "serial_number"): "111111111111"})
+    with pytest.raises(NotebookError, match=f"drives.{JOINT}.serial_number = 3854345a3133.*= 111111111111"):
+        other.run(ScriptedOperator())
+
+
+def test_nothing_moves_without_the_operator_s_consent(case: Case) -> None:
+    with pytest.raises(EndedError):
+        case.run(ScriptedOperator("", "", "", "n"))
+
+
+def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Path) -> None:
+    own_bench.stop_daemon()
+    configuration = parse_configuration(own_bench.configuration.read_text(encoding="utf-8"))
+    with running_daemon(configuration, tmp_path) as socket:
+        client = StatusClient(socket)
+        assert client.call("status")["robot"] == "simulated"
+        client.close()
+    assert not socket.exists()
+    own_bench.restart_daemon()
+    own_bench.wait_until_ready()

@@ -1,0 +1,97 @@
+"""Hands alone, without torque, show each error of a configuration: the robot is built otherwise than configured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from control.records import JOINTS
+from experiments.actuator.file_change import changed_text
+from experiments.actuator.simulation import BuiltRobot
+from experiments.calibration.hand_steps import HandSteps, hand_changes, level_key, stops_deg
+from experiments.calibration.robots import SimulatedRobot
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.robot.steps import conduct_steps
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, REDO
+from experiments.study.session import Session
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from simulation.body.plant import END_STOPS_RAD
+from tests.scripted_operator import ScriptedOperator
+
+Changes = Mapping[tuple[str, ...], Any]
+CONFIGURATION = simulated_configuration()
+CUBEMARS = simulated_configuration(drive_type="mit:AK80-9")
+
+
+def with_changes(configuration: Configuration, changes: Changes) -> Configuration:
+    return parse_configuration(changed_text(configuration.text, changes))
+
+
+def move_by_hand(
+    folder: Path, configuration: Configuration, truth: Changes, *joints: str, operator: ScriptedOperator | None = None
+) -> dict[str, Entry]:
+    """Return the notebook's entries of a robot whose truth differs from its configuration."""
+    operator = operator or ScriptedOperator()
+    session = Session(folder, operator, lambda done, total: None, simulated=True)
+    robot = SimulatedRobot(session, BuiltRobot(with_changes(configuration, truth)), seed=1)
+    notebook = Notebook(folder, {})
+    with robot.open(configuration) as (test_rig, hand):
+        steps = HandSteps(test_rig, operator, hand).steps(joints or JOINTS)
+        conduct_steps(steps, notebook, operator, session.show, {})
+    return notebook.entries
+
+
+@pytest.mark.parametrize(
+    ("configuration", "truth"),
+    [
+        (CONFIGURATION, {}),
+        (CONFIGURATION, {("drive", "right_sweep", "sign"): 1}),
+        (CONFIGURATION, {("drive", "left_adduction", "zero_turn"): 0.07}),
+        (CONFIGURATION, {("drive", "left_sweep", "sign"): -1, ("drive", "left_sweep", "zero_turn"): -0.1}),
+        (CUBEMARS, {("drive", "right_adduction", "velocity_range_rad_s"): 25.64}),
+        (CUBEMARS, {("drive", "left_sweep", "velocity_range_rad_s"): 65.0, ("drive", "left_sweep", "sign"): -1}),
+    ],
+)
+def test_the_truth_is_recovered_and_nothing_else_is_changed(
+    tmp_path: Path, configuration: Configuration, truth: dict[tuple[str, ...], Any]
+) -> None:
+    entries = move_by_hand(tmp_path, configuration, truth)
+    found = hand_changes(configuration, entries)
+    assert found.keys() == truth.keys()
+    for key, value in truth.items():
+        assert found[key] == pytest.approx(value, rel=0.03, abs=0.001)
+    for joint, stop_rad in zip(JOINTS, 2 * END_STOPS_RAD, strict=True):
+        assert stops_deg(entries, joint) == pytest.approx((-degrees(stop_rad), degrees(stop_rad)), abs=0.2)
+
+
+def test_a_limit_beyond_a_stop_is_narrowed_to_one_degree_before_it(tmp_path: Path) -> None:
+    wide = with_changes(CONFIGURATION, {("limits", "sweep_max_deg"): 110.0})
+    found = hand_changes(wide, move_by_hand(tmp_path, wide, {}, "left_sweep"))
+    assert found == {("limits", "sweep_max_deg"): 98.0}
+
+
+def test_exchanged_motors_end_the_calibration_with_what_to_do(tmp_path: Path) -> None:
+    exchanged: Changes = {("drive", "left_sweep", "node_id"): 1, ("drive", "left_adduction", "node_id"): 0}
+    with pytest.raises(BenchError, match="left_adduction turned instead of left_sweep.*node ids"):
+        move_by_hand(tmp_path, CONFIGURATION, exchanged, "left_sweep")
+
+
+def test_a_velocity_whose_scale_is_no_key_is_refused(tmp_path: Path) -> None:
+    entries = move_by_hand(tmp_path, CONFIGURATION, {}, "left_sweep")
+    entries["left_sweep: ends"]["velocity_scale"] = 1.2
+    with pytest.raises(BenchError, match="left_sweep: .* 1.20 times"):
+        hand_changes(CONFIGURATION, entries)
+
+
+def test_a_joint_is_moved_again_and_the_step_before_is_redone_on_request(tmp_path: Path) -> None:
+    """The level flipper, front; the one before; level, front, rear: again; front, rear."""
+    operator = ScriptedOperator(GO_ON, REDO, GO_ON, GO_ON, REDO, GO_ON, GO_ON)
+    entries = move_by_hand(tmp_path, CONFIGURATION, {}, "left_sweep", operator=operator)
+    assert len(operator.asked) == 7 and entries.keys() == {level_key("left"), "left_sweep: ends"}
