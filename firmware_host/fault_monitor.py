@@ -34,6 +34,7 @@ from firmware_host.loop_monitor import LogMonitor, LoopMonitor
 from firmware_host.ticker import Tick
 
 LATE_S = 0.1  # beyond it, a computer without real time: a simulated robot next to other programs
+PUNCTUAL_FRACTION = 0.5  # of a period: a tick that is later gives its torque a much longer or shorter time
 STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
 CUT_S = 0.1  # of the silence of all drives, which began within this time: the motors' power is cut
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
@@ -139,7 +140,8 @@ class FaultMonitor:
         if not self.power_cut:
             self._check_power(found, health)
         sent_nm = monitor_input.sent.torques_nm
-        self._gains.update(found, tick.missed == 0, monitor_input.states, sent_nm, monitor_input.phase)
+        punctual = tick.late_s < PUNCTUAL_FRACTION * self._period_s
+        self._gains.update(found, punctual, monitor_input.states, sent_nm, monitor_input.phase)
         self._check_trust(found, monitor_input.mode)
         if not monitor_input.sent.finite:
             found.append(FaultKind.TORQUE_NOT_FINITE.fault())

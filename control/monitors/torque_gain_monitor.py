@@ -7,7 +7,8 @@ and its current looks healthy. In air the torque that moves a joint is known fro
 
 so the commanded torque u follows the line u = m / gain + c. The constant c of each stroke, a motion in one direction,
 holds what is not known: dry friction and the weight of clinging mud. Blocks of four ticks average the noise of the
-velocity: over T = 10.5 ms its effect on u and m is correlated by no more than 1 / (2 · 4) of their variance.
+velocity: over T = 10.5 ms its effect on u and m is correlated by no more than 1 / (2 · 4) of their variance. Only
+blocks of punctual ticks count: u is the mean of commands that acted equally long.
 
 Two regressions enclose the gain. That of m on u attenuates it where u has other causes, such as mud or cogging; that of
 u on m inflates it by the noise of m:
@@ -38,6 +39,7 @@ from control.records import DriveState, DriveStates, Phase, Torques
 BLOCK_TICKS = 4
 SLOW_RAD_S = 0.1  # below it dry friction has any direction
 LEAST_BLOCKS = 7  # of a phase
+LEAST_NM2 = 1e-6  # of Σ u² about the mean: a torque at its limit varies by the rounding of floats
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
 FACTOR_OF_ONE, FACTOR_OF_THREE = 2.0, 1.6
 STRIDES = 3
@@ -62,7 +64,7 @@ class Moments(NamedTuple):
     def gain_beyond(self, factor: float) -> float | None:
         """Return the gain, if it is certainly beyond this factor or its inverse."""
         blocks, uu, um, mm = self
-        if blocks < LEAST_BLOCKS or um <= 0.0 or um * um < SAME_FRACTION * uu * mm:
+        if blocks < LEAST_BLOCKS or uu < LEAST_NM2 or um <= 0.0 or um * um < SAME_FRACTION * uu * mm:
             return None
         if um > factor * uu or factor * mm < um:
             gain: float = (mm / uu) ** 0.5

@@ -70,8 +70,8 @@ class Lockstep:
     """Owns the common time of robot and loop. Disturbances change the mud and the drives.
 
     `plant` and `drives` replace those made from configuration, disturbances and base. `failures` make parts of the
-    loop's side fail: `fail` starts them. The loop misses as many ticks as `late_ticks` says before its next one, and
-    the wall clock is ahead by `wall_offset_s`.
+    loop's side fail: `fail` starts them. The loop misses as many ticks as `late_ticks` says before its next one, wakes
+    up late by `late_s`, less than a period, and the wall clock is ahead by `wall_offset_s`.
     """
 
     def __init__(
@@ -112,11 +112,12 @@ class Lockstep:
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
         self.tick_number = 0
+        self.late_s = 0.0
         self.acts: list[Callable[[], None]] = []  # called in every step, after the robot's and before the loop's
 
     @property
     def now_s(self) -> float:
-        return self.tick_number * self.period_s
+        return self.tick_number * self.period_s + self.late_s
 
     def _now_s(self) -> float:  # a method, which a copy of the robot rebinds, unlike a lambda
         return self.now_s
@@ -133,7 +134,7 @@ class Lockstep:
             act()
         for failure in self.failures.update(self.now_s):
             self.loop.events.report(self.now_s, end_text(failure))
-        self.loop.tick(Tick(self.now_s, missed * self.period_s, self.tick_number, missed))
+        self.loop.tick(Tick(self.now_s, missed * self.period_s + self.late_s, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
         """Make a component fail from the next tick on. Raises RuntimeError where it is refused."""

@@ -1,11 +1,13 @@
 """A motor whose true torque constant is wrong, and a zero that shifts at a restart, by the truth of the plant."""
 
 from dataclasses import replace
+from random import Random
 
 import pytest
 
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
+from control.records import JOINTS
 from drivers.fault_injection.failure_table import FAILURE_MODES
 from simulation.devices.foreign_master import ForeignMaster
 from simulation.harness.joint_energy import JointEnergy
@@ -63,6 +65,18 @@ def test_a_wrong_torque_constant_ends_the_walk_before_its_motor_did_much_work(
     right.run_until(lambda: right.now_s >= robot.now_s, 10.0)
     index = robot.index_of(joint)
     assert works[0].joints[index].energy_j <= works[1].joints[index].energy_j + most_j
+
+
+def test_a_loop_that_wakes_up_late_makes_no_permitted_torque_constant_wrong(walking: dict[str, FailingRobot]) -> None:
+    robot, chance = copy_of(walking["mit"]), Random(1)
+    for joint in JOINTS:
+        robot.change_drive(joint, torque_constant_error=0.5)
+    names = set()
+    for _ in range(round(2.5 * STRIDE_S / robot.period_s)):
+        robot.late_s = 0.9 * robot.period_s * (chance.random() < 0.5)
+        robot.step()
+        names |= {fault.name for fault in robot.loop.faults.begun}
+    assert robot.loop.mode is Mode.WALKING and "torque_gain" not in names
 
 
 @pytest.mark.parametrize("boot_s", [0.02, 0.1, 1.0])
