@@ -90,9 +90,12 @@ def tripped(robot: FailingRobot, joint: str, error: str) -> None:
 
 @during
 def watchdog_ran_out(robot: FailingRobot, joint: str) -> Iterator[None]:
-    """Cut off the commands until the drive's watchdog has tripped; the injection begins there."""
+    """Cut off the commands until the drive's watchdog is about to trip; the injection begins there.
+
+    The loop may see before that the drive follows an old command.
+    """
     with failing(robot, joint, "JOINT.command", "off"):
-        robot.run_until(lambda: robot.drive(joint).failed, 0.5)
+        robot.run_for(robot.drive(joint).parameters.watchdog_s - 2.0 * PERIOD_S)
         yield
 
 
