@@ -126,7 +126,11 @@ class MitAxis(AnsweringAxis):
 
     def _receive_foreign_register(self, data: bytes, now_s: float) -> None:
         node_id, kind, _, _ = codec.decode_register(data)
-        if node_id == self.parameters.node_id and kind in (codec.WRITE, codec.STORE):
+        if node_id != self.parameters.node_id:
+            return
+        if kind == codec.STATE:
+            self._on_question()
+        elif kind in (codec.WRITE, codec.STORE):
             self._count_foreign_command()
 
     def _on_restart(self) -> None:

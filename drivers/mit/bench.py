@@ -1,9 +1,10 @@
-"""Finds drives in MIT mode: by the command to leave it, which ends torque, and by the registers of a Damiao.
+"""Finds drives in MIT mode: by the state request and the registers of a Damiao, and by the command to leave the mode.
 
-There is no question that is no command. Leaving the mode is the only one that cannot exert torque, and every drive
-answers it. To an ODrive of id 0 these frames are its commands 1 to 15 (an emergency stop among them), and the id of
-the registers, 0x7FF, is the command to node 63 to enter the boot loader, and node 63 may mean all ODrives (their tools
-reboot all by it): they must not be sent where one listens.
+A Damiao answers a request that is no command, so what another program does with it goes on. Every other drive, and old
+firmware of a Damiao, answers commands alone. Leaving the mode, which ends torque, is the only one that cannot exert it.
+To an ODrive of id 0 these frames are its commands 1 to 15 (an emergency stop among them), and the id of the registers,
+0x7FF, is the command to node 63 to enter the boot loader, and node 63 may mean all ODrives (their tools reboot all by
+it): they must not be sent where one listens.
 Sources: see codec.py; ODrive's CANSimple documentation.
 """
 
@@ -36,11 +37,9 @@ class MitBench(DriveBench):
         return {identifier & 0xFF for identifier in extended if identifier >> 8 == OTHER_REPORT}
 
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
-        answered: dict[int, list[int]] = {}  # the ids of the answers, by the id of the drive that gave them
-        for frame in port.ask_all(Frame(node_id, codec.LEAVE) for node_id in IDS):
-            node_id = node_of(frame)
-            if is_answer(frame, node_id) and not is_register(frame, node_id):
-                answered.setdefault(node_id, []).append(frame.arbitration_id)
+        answered = _answers(port.ask_all(codec.state_request(node_id) for node_id in IDS))
+        silent = [node_id for node_id in IDS if node_id not in answered]
+        answered |= _answers(port.ask_all(Frame(node_id, codec.LEAVE) for node_id in silent))
         registers = _read_registers(port, answered)
         others = sorted(heard - answered.keys())
         return [
@@ -57,6 +56,16 @@ class MitBench(DriveBench):
         if parameters.ranges.has_registers:
             return DamiaoSetup(port, parameters, facts.longest_watchdog_s)
         return NoSetup(FoundDrive(NAME, parameters.node_id, parameters.model), NOTHING)
+
+
+def _answers(frames: Iterable[Frame]) -> dict[int, list[int]]:
+    """Return the ids of the answers, by the id of the drive that gave them."""
+    answered: dict[int, list[int]] = {}
+    for frame in frames:
+        node_id = node_of(frame)
+        if is_answer(frame, node_id) and not is_register(frame, node_id):
+            answered.setdefault(node_id, []).append(frame.arbitration_id)
+    return answered
 
 
 def _read_registers(port: BenchPort, node_ids: Iterable[int]) -> dict[int, Values]:

@@ -18,7 +18,7 @@ from math import nan
 from struct import Struct
 from typing import NamedTuple
 
-from drivers.can.frames import MalformedMessageError
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit.models import TORQUE_CODES, Model
 
 ANSWER_BYTES = 8
@@ -128,6 +128,11 @@ def encode_answer(answer: Answer, model: Model) -> bytes:
 
 def encode_read(node_id: int, register: int) -> bytes:
     return encode_register(node_id, READ, register, bytes(4))
+
+
+def state_request(node_id: int) -> Frame:
+    """Ask a Damiao for an answer without a command; firmware that does not know the request is silent."""
+    return Frame(REGISTER_ID, encode_register(node_id, STATE, 0, bytes(4)))
 
 
 def encode_register(node_id: int, kind: int, register: int, value: bytes) -> bytes:

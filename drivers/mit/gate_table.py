@@ -1,8 +1,8 @@
 """Lists what may pass the transmit gate for one drive in MIT mode.
 
-Leaving the mode and, for a Damiao, clearing errors and reading the settings may always leave; entering only while the
-gate is open. No other gains than zero, no new zero position and no register may ever be written. No code is zero torque
-exactly, so while the gate is closed not even the nearest one leaves: leaving the mode takes its place.
+Leaving the mode and, for a Damiao, clearing errors and reading state and settings may always leave; entering only while
+the gate is open. No other gains than zero, no new zero position and no register may ever be written. No code is zero
+torque exactly, so while the gate is closed not even the nearest one leaves: leaving the mode takes its place.
 """
 
 from drivers.mit import codec
@@ -17,7 +17,12 @@ def gate_table(drive: MitParameters) -> GateTable:
     if ranges.has_registers:
         always = {
             node_id: frozenset({codec.LEAVE, codec.CLEAR}),
-            codec.REGISTER_ID: frozenset(codec.encode_read(node_id, register) for register in (*REGISTERS, SUPPLY_V)),
+            codec.REGISTER_ID: frozenset(
+                (
+                    codec.state_request(node_id).data,
+                    *(codec.encode_read(node_id, register) for register in (*REGISTERS, SUPPLY_V)),
+                )
+            ),
         }
     return GateTable(
         node_id=node_id,

@@ -8,6 +8,7 @@ on. Source: damiao-motor 1.0.6 (REGISTER_TABLE and store_parameters of core/moto
 from collections.abc import Mapping, Sequence
 from struct import Struct
 
+from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.drive_setup import WATCHDOG_S, AskedSetup, FoundDrive, Setting, exactly
 from drivers.can.frames import Frame
 from drivers.mit import codec
@@ -93,15 +94,21 @@ class DamiaoSetup(AskedSetup):
         )
 
     def activity(self) -> str:
-        """Ask by the command to leave the mode, the only question there is: it also ends the drive's torque."""
-        node_id = self._parameters.node_id
-        answer = self._port.ask(
-            Frame(node_id, codec.LEAVE),
-            lambda frame: is_answer(frame, node_id) and not is_register(frame, node_id),
-            "the command to leave the mode",
-        )
+        """Ask for the state; old firmware by the command to leave the mode, which also ends its torque."""
+        try:
+            answer = self._ask_state(codec.state_request(self._parameters.node_id))
+        except NoAnswerError:
+            answer = self._ask_state(Frame(self._parameters.node_id, codec.LEAVE))
         status = answer.data[0] >> 4
         return "" if status == codec.DISABLED else f"status {status:X}"
+
+    def _ask_state(self, question: Frame) -> Frame:
+        node_id = self._parameters.node_id
+        return self._port.ask(
+            question,
+            lambda frame: is_answer(frame, node_id) and not is_register(frame, node_id),
+            "the request of its state and the command to leave the mode",
+        )
 
     def settings(self) -> Sequence[Setting]:
         drive, longest_s = self._parameters, self._longest_watchdog_s
