@@ -289,7 +289,7 @@ class FaultKind(StrEnum):
     )
     JOINT_DRIVEN_BACK = (
         "joint_driven_back", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 270,
-        "A joint moves against a large torque for 0.4 s.",
+        "A joint moves against a large torque for 0.3 s.",
         "The {subject} joint moves against its motor's torque, as under a load that the motor cannot hold, or at an end"
         " stop while its encoder slips.",
         "take a load off, or check encoder, magnet and cable, then 'mudskipper clear'",

@@ -16,10 +16,11 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  in air only.
     driven back  the path against a torque, where the target does not lead, in intervals in a row. Mud, friction and
                  stops yield to a torque or resist it, and a load that outweighs it moves the joint until both are
-                 equal. Only where the joint presses against its stop while the encoder slips together with its speed
-                 does it seem to move on. An encoder that slips alone is found before (speed_monitor.py). Where the
-                 target stands still, a hand that pushes or hangs a weight moves a joint just so, up to the largest
-                 torque: only a torque near the limit counts there.
+                 equal. A target that moves against a torque near the limit does not lead: the joint is far ahead. Only
+                 where the joint presses against its stop while the encoder slips together with its speed does it seem
+                 to move on. An encoder that slips alone is found before (speed_monitor.py). Where the target stands
+                 still, a hand that pushes or hangs a weight moves a joint just so, up to the largest torque: only a
+                 torque near the limit counts there.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -44,7 +45,7 @@ PRESSING_NM = 0.25  # more than dry friction and cogging
 PRESSING_FRACTION = 0.9  # of the torque limit, where the target stands still
 DRIVEN_BACK_S = 0.09
 DRIVEN_BACK_RAD = 0.0027  # in each interval, 0.03 rad/s: seven steps of a 14-bit encoder
-DRIVEN_BACK_INTERVALS = 4  # in a row, so after at most five; a body that sinks pushes a swing back in two
+DRIVEN_BACK_INTERVALS = 3  # in a row, so after at most four; a body that sinks pushes a swing back in two
 LONGEST_GAP_S = 0.03  # between two samples
 PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
 SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
@@ -113,12 +114,13 @@ class MotionMonitor:
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
-        least_nm = self._held_nm if target_rad == self._target_rad else PRESSING_NM
+        target_step_rad = target_rad - self._target_rad
+        least_nm = PRESSING_NM if target_step_rad > 0.0 or target_step_rad < 0.0 else self._held_nm  # also without one
         if -least_nm < torque_nm < least_nm:
             self._pressing_nm = torque_nm
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
         else:
-            self._watch_pressing(elapsed_s, step_rad, torque_nm, target_rad - self._target_rad)
+            self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
@@ -126,7 +128,7 @@ class MotionMonitor:
             self.away_rad = 0.0
             return
         self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
-        step_of_target_rad = abs(target_rad - self._target_rad)
+        step_of_target_rad = abs(target_step_rad)
         if step_of_target_rad != step_of_target_rad:
             return
         error_rad = abs(target_rad - (self._angle_rad + step_rad)) - self._lag_rad
@@ -137,12 +139,13 @@ class MotionMonitor:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
         lasts = torque_nm * self._pressing_nm >= 0.0
         self._pressing_nm = torque_nm
-        if not lasts or target_step_rad != target_step_rad:
+        if not lasts:
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
             return
         back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
+        leads = target_back_rad > 0.0 and abs(torque_nm) < self._held_nm
         self._pressed_s += elapsed_s
-        self._back_rad += back_rad - target_back_rad if target_back_rad > 0.0 else back_rad
+        self._back_rad += back_rad - target_back_rad if leads else back_rad
         if self._pressed_s >= DRIVEN_BACK_S:
             self.driven_back = self.driven_back + 1 if self._back_rad > DRIVEN_BACK_RAD else 0
             self._pressed_s = self._back_rad = 0.0

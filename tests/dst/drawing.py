@@ -228,8 +228,6 @@ def _log_uniform(random: Random, low: float, high: float) -> float:
     return round(exp(random.uniform(log(low), log(high))), 3)
 
 
-# Two open defects, which no seed of CI meets and fresh ones may: of a sweep joint whose speed slips too while it walks,
-# 0.5 rad/s presses the joint for 0.61 s, not 0.5 s at most; 0.3 is no fault within 7 s, pressed 0.46 s at a time.
 def _draw_slip(random: Random) -> dict[str, float]:
     """Draw an encoder that slips, whose reported speed slips too or does not."""
     slip_rad_s = random.choice((-1.0, 1.0)) * _log_uniform(random, 0.05, 1.0)
