@@ -203,7 +203,7 @@ class FaultMonitor:
             self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
             if stalled and health.restarts == self._restarts[health.joint]:
-                zero.skip_gap()
+                zero.skip_gap(tick.now_s)
             shifted = zero.update(state)
             if shifted:
                 found.append(shifted)

@@ -11,7 +11,7 @@ from math import degrees
 from control.faults import Fault, FaultKind
 from control.monitors.encoder_monitor import LONGEST_GAP_S
 from control.monitors.motion_monitor import PUNCTUAL_S
-from control.records import UNKNOWN, DriveState
+from control.records import NEVER_S, UNKNOWN, DriveState
 
 LARGEST_STEP_RAD = 100.0  # more is no measurement
 
@@ -24,6 +24,7 @@ class ZeroMonitor:
         self._jump_rad = jump_rad
         self.shift_rad = 0.0
         self._before = DriveState()
+        self._gap_end_s = NEVER_S
 
     def update(self, state: DriveState) -> Fault | None:
         """Return the fault of a zero that nobody has confirmed since it may have shifted."""
@@ -46,10 +47,14 @@ class ZeroMonitor:
             return
         if silence_s >= PUNCTUAL_S and abs(step_rad) > self._jump_rad + fastest_rad_s * min(silence_s, LONGEST_GAP_S):
             self.shift_rad += step_rad
-        self._before = state
+        self._before = state if state.angle_stamp_s >= self._gap_end_s else state._replace(angle_rad=UNKNOWN)
 
-    def skip_gap(self) -> None:
-        """Accept the next angle: this program missed ticks, and a drive that is not asked does not answer."""
+    def skip_gap(self, now_s: float) -> None:
+        """Accept the first angle since now: this program missed ticks, and a drive that is not asked does not answer.
+
+        The answer to the last question before the gap is read after it.
+        """
+        self._gap_end_s = now_s
         self._before = self._before._replace(angle_rad=UNKNOWN)
 
     def confirm(self) -> float:
