@@ -1,6 +1,7 @@
 """The pictures of a report: every fit with its residuals, after the law τ = k Φ, and several runs side by side.
 
-Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient in N/cm³.
+Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient in N/cm³. In a stance the depth, and so the
+moment, hardly changes: shear is drawn along its stroke instead, with a line of k times the moment.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,12 +14,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pandas import DataFrame
 
+from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, looks_of, mark_of
 from experiments.reports.style import FAINT
 from experiments.reports.value_text import N_CM3
-from experiments.run_report.results import SPEED, Entry
+from experiments.run_report.results import SPEED, Entry, run_labels
 from experiments.run_report.run import Run
 
 CM4, N_CM = 1e8, 100.0  # in m⁴, and in N·m
@@ -28,6 +30,7 @@ LEGEND_COLUMN_IN = 2.8  # "k_p 1.4 N/cm³, from 3200 s" with its mark
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
 WIDTH_IN, HEIGHT_IN = (6.0, 10.0), 7.2  # with one flipper, and with two
 ROOM = 1.12  # above the largest value, for the arrows of bounds
+DRAWN_OF_FIT = ("torques_nm", "residuals_nm")
 MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
 
@@ -50,32 +53,48 @@ def draw_fits(run: Run) -> Figure:
     for row, name in zip(axes, COEFFICIENTS, strict=True):
         for fit, residuals, flipper in zip(row[::2], row[1::2], flippers, strict=True):
             own = fitted[(fitted["coefficient"] == name) & (fitted["flipper"] == flipper)]
-            _draw_samples(fit, residuals, own, looks)
+            _draw_samples(fit, residuals, own, looks, along_stroke=name == "k_s")
             fit.set_title(f"{LABELS[name]}, {flipper}")
             residuals.set_title("residuals")
         _share_scales(row)
         row[0].set_ylabel("torque (N·cm)")
-    for panel in axes[-1]:
-        panel.set_xlabel("moment (cm⁴)")
+    for row, name in zip(axes, COEFFICIENTS, strict=True):
+        for panel in row:
+            panel.set_xlabel("part of the stroke (%)" if name == "k_s" else "moment (cm⁴)")
     handles = [axes[0, 0].plot([], [], **looks[mud], label=mud.replace("k_p", "$k_p$"))[0] for mud in muds]
     columns = min(max(len(muds), 1), int(width_in / LEGEND_COLUMN_IN))
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
     return figure
 
 
-def _draw_samples(fit: Axes, residuals: Axes, fitted: DataFrame, looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_samples(
+    fit: Axes, residuals: Axes, fitted: DataFrame, looks: Mapping[str, dict[str, Any]], along_stroke: bool
+) -> None:
     """Draw all strides of a mud as one artist of each kind: one of its own takes ten kilobytes."""
     for mud, all_samples in fitted.groupby("mud", sort=False)["samples"]:
         chosen = np.unique(np.linspace(0, len(all_samples) - 1, MOST_DRAWN).round().astype(int))
         samples = [all_samples.iloc[number] for number in chosen]
-        parts = zip(*((each.moments_m4, each.torques_nm, each.residuals_nm) for each in samples), strict=True)
-        moments, torques, remains = map(np.concatenate, parts)
-        ends = [(CM4 * max(each.moments_m4), each.slope / N_CM3) for each in samples]
-        lines = [([0.0, end, nan], [0.0, slope * end, nan]) for end, slope in ends]
-        fit.plot(CM4 * moments, N_CM * torques, **looks[str(mud)])
+        places = [_percent_of_stroke(each) if along_stroke else CM4 * np.asarray(each.moments_m4) for each in samples]
+        lines = [_fitted_line(*each, along_stroke) for each in zip(samples, places, strict=True)]
+        torques, remains = (np.concatenate([getattr(each, name) for each in samples]) for name in DRAWN_OF_FIT)
+        fit.plot(np.concatenate(places), N_CM * torques, **looks[str(mud)])
         fit.plot(*np.hstack(lines), color=looks[str(mud)]["color"], linewidth=0.8)
-        residuals.plot(CM4 * moments, N_CM * remains, **looks[str(mud)])
+        residuals.plot(np.concatenate(places), N_CM * remains, **looks[str(mud)])
     residuals.axhline(0.0, color=FAINT, linewidth=0.8)
+
+
+def _percent_of_stroke(samples: FitSamples) -> NDArray[np.float64]:
+    """Return the middle of each batch of travel on the way of all of them."""
+    ends_m = np.cumsum(samples.weights_m)
+    return np.asarray(100.0 * (ends_m - np.asarray(samples.weights_m) / 2.0) / ends_m[-1])
+
+
+def _fitted_line(samples: FitSamples, places: NDArray[np.float64], along_stroke: bool) -> tuple[Any, Any]:
+    """Return the fitted torque at the samples, or the line from the origin; NaN parts it from the next one."""
+    if along_stroke:
+        fitted_nm = np.subtract(samples.torques_nm, samples.residuals_nm)
+        return [*places, nan], [*(N_CM * fitted_nm), nan]
+    return [0.0, max(places), nan], [0.0, samples.slope / N_CM3 * max(places), nan]
 
 
 def _share_scales(row: Sequence[Axes]) -> None:
@@ -109,9 +128,10 @@ def _cut_outliers(panels: Sequence[Axes], heights: Sequence[NDArray[np.float64]]
 
 def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:
     """Draw speed and coefficients of several runs mud by mud; bars are two standard errors, arrows lower bounds."""
-    results = [(run.name, result) for run, headline in zip(runs, headlines, strict=True) for result in headline["muds"]]
+    labels = [*run_labels(runs, headlines).values()]
+    results = [(run, each) for run, headline in zip(labels, headlines, strict=True) for each in headline["muds"]]
     muds = {mud_key(result["mud"]): result["mud"] for _, result in results}
-    looks = {name: mark_of(look) for name, look in looks_of([run.name for run in runs]).items()}
+    looks = {name: mark_of(look) for name, look in looks_of(labels).items()}
     has_speed = any(result["speed_m_s"] is not None for _, result in results)
     figure = Figure(figsize=(10.0, 6.0), layout="constrained")
     axes = figure.subplots(2, 2).flatten() if has_speed else figure.subplots(1, 3)

@@ -15,6 +15,7 @@ from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds
 from experiments.run_report.results import (
@@ -27,6 +28,7 @@ from experiments.run_report.results import (
     headline_sentences,
     is_shown,
     reaction_of,
+    run_labels,
 )
 from experiments.run_report.run import MudsFrom, Run
 from experiments.study.result import Figure, Result, Table
@@ -59,7 +61,8 @@ WALK = (
 )
 FITS = (
     "Every fit and its residuals: the torque that resists the flipper against the moment of the submerged plate. The "
-    "slope of a line is the coefficient of one stride. At most ten strides of each mud are drawn."
+    "slope of a line is the coefficient of one stride. In a stance that moment hardly changes, so shear is drawn along "
+    "the stroke, with the moment times the coefficient. At most ten strides of each mud are drawn."
 )
 R_SQUARED = (
     "R² is 1 - Σr²/Στ² of torques τ and residuals r, as usual for a line through the origin. R² about the mean has "
@@ -81,9 +84,9 @@ def run_result(run: Run, headline: Entry) -> Result:
     else:
         texts |= {"Faults": f"{SINCE} Faults of one cause are one row." if run.causes else "None."}
         tables.append(_table("Faults", _cause_rows(run, begin_s)))
-    for number, walk in enumerate(run.walks, 1):
-        texts[f"Walk {number}"] = _walk_text(walk)
-        figures += _walk_figures(run, walk, number)
+    for index, walk in enumerate(run.walks, 1):
+        texts[f"Walk {index}"] = _walk_text(walk)
+        figures += _walk_figures(run, walk, index)
     if headline["muds"]:
         rows = quality_rows(run)
         has_fits = bool(run.estimates["samples"].notna().any())
@@ -170,7 +173,7 @@ def _mud_cells(result: Entry) -> dict[str, Any]:
     return {
         "strides": result["strides"],
         "good / slipped / stuck": counts_cell(result["outcomes"]),
-        "distance": result["distance_m"],
+        "distance": number(result["distance_m"], 2),
         "speed": value_text(result["speed_m_s"], result["speed_std_error_m_s"], per=CM),
         "depth": " to ".join(dict.fromkeys(depths_cm)),
         **{name: coefficient_cell(result["both"][name]) for name in COEFFICIENTS},
@@ -293,7 +296,8 @@ def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
 
 def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result:
     """Compare several runs: one table, one figure, and the differences to the first run."""
-    first, found = runs[0].name, differences(runs, headlines)
+    labels, found = run_labels(runs, headlines), differences(runs, headlines)
+    first = labels[runs[0].name]
     shared = " The error that all strides of one robot share is left out: it moves its runs alike."
     compared = f"Every run compared with {first}. A difference is shown beyond {SHOWN:g} standard errors. {DEPTHS}"
     compared += shared * (len({run.robot for run in runs}) == 1)
@@ -305,12 +309,14 @@ def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result
     for run, headline in zip(runs, headlines, strict=True):
         faults = {"faults": f"{headline['stops']} stopped it" if headline["stops"] else "-"}
         muds = [{"mud": each["mud"]} | _mud_cells(each) for each in headline["muds"]]
-        rows += [{"run": run.name} | each | faults for each in muds or [{"mud": "-", "strides": headline["strides"]}]]
+        rows += [
+            {"run": labels[run.name]} | each | faults for each in muds or [{"mud": "-", "strides": headline["strides"]}]
+        ]
     results = _table("Result", rows)
     empty = [name for name in results.rows if set(results.rows[name].fillna("-")) == {"-"}]
     tables = [
         Table("Result", "", UNITS, results.rows.drop(columns=empty)),
-        _table("Differences", _difference_rows(found)),
+        _table("Differences", _difference_rows(found, labels)),
     ]
     has_muds = any(headline["muds"] for headline in headlines)
     figures = [Figure("comparison", COMPARED, partial(draw_comparison, runs, headlines))] * has_muds
@@ -320,11 +326,12 @@ def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result
 
 def comparison_sentences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[str]:
     """Say how fast each run was, and how many differences are larger than their uncertainty."""
-    named = [(run.name, headline) for run, headline in zip(runs, headlines, strict=True)]
+    labels = run_labels(runs, headlines)
+    named = [(labels[run.name], headline) for run, headline in zip(runs, headlines, strict=True)]
     known = [f"{name} {each['speed_m_s'] / CM:.1f} cm/s" for name, each in named if each["speed_m_s"] is not None]
     empty = [name for name, each in named if not each["strides"]]
     found = differences(runs, headlines)
-    shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {runs[0].name}"
+    shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {labels[runs[0].name]}"
     return [
         *end_sentences(runs),
         f"{counted(len(runs), 'run')}, {counted(sum(each['strides'] for each in headlines), 'stride')}.",
@@ -334,7 +341,7 @@ def comparison_sentences(runs: Sequence[Run], headlines: Sequence[Entry]) -> lis
     ]
 
 
-def _difference_rows(found: Sequence[Entry]) -> list[dict[str, Any]]:
+def _difference_rows(found: Sequence[Entry], labels: Mapping[str, str]) -> list[dict[str, Any]]:
     verdicts = {None: "uncertainty not known", True: "differs", False: "no difference shown"}
     rows = []
     for each in found:
@@ -342,7 +349,7 @@ def _difference_rows(found: Sequence[Entry]) -> list[dict[str, Any]]:
         depth = ", at another depth" * (each["quantity"] != SPEED and not each["like_depths"])
         rows.append(
             {
-                "run": each["run"],
+                "run": labels[each["run"]],
                 "mud": each["mud"],
                 "quantity": f"{each['quantity']} ({unit})",
                 "in the first run": value_text(each["first"], per=per),

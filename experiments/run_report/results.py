@@ -163,6 +163,20 @@ def _travel_sentence(headline: Entry) -> str:
 # several runs
 
 
+def run_labels(runs: Sequence[Run], headlines: Sequence[Entry]) -> dict[str, str]:
+    """Return what tables and pictures call each run, by its name: mud, trial and tags, and its name if these repeat."""
+    texts = {run.name: _trial_label(each["trial"]) for run, each in zip(runs, headlines, strict=True)}
+    return {
+        name: f"{text}, {name}" if text and [*texts.values()].count(text) > 1 else text or name
+        for name, text in texts.items()
+    }
+
+
+def _trial_label(trial: Trial) -> str:
+    parts = (f"{key} {trial[key]}" for key in ("mud", "trial") if key in trial)
+    return ", ".join([*parts, *filter(None, [trial.get("tags", "").replace(",", ", ")])])
+
+
 def differences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[Entry]:
     """Compare every run with the first. A quantity is in m/s for the speed, else in N/m³.
 

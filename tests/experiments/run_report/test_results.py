@@ -18,7 +18,7 @@ from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import gather_coefficient
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.run_report.page import coefficient_cell, counts_cell
+from experiments.run_report.page import coefficient_cell, comparison_result, counts_cell
 from experiments.run_report.results import (
     SPEED,
     differences,
@@ -26,6 +26,7 @@ from experiments.run_report.results import (
     headline_sentences,
     is_shown,
     reaction_of,
+    run_labels,
     speed_of,
 )
 from experiments.run_report.run import Run, read_runs
@@ -201,3 +202,18 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_with([1.0e6, 1.1e6], mud="48.50"))) == {SPEED, "k_p", "k_s", "k_e"}
     assert between(first, run_with([1.0e6, 1.1e6], mud="pond")) == {}
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
+
+
+def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_repeat() -> None:
+    trials = [
+        {"mud": "A", "trial": "3", "tags": "wet,warm", "operator": "Anna"},
+        {"mud": "A", "trial": "4"},
+        {"mud": "A", "trial": "4"},
+        {},
+    ]
+    runs = [run_of([stride("A")], name=f"log-{number}") for number in range(4)]
+    headlines = [headline_of(run) | {"trial": trial} for run, trial in zip(runs, trials, strict=True)]
+    labels = ["mud A, trial 3, wet, warm", "mud A, trial 4, log-1", "mud A, trial 4, log-2", "log-3"]
+    assert [*run_labels(runs, headlines).values()] == labels
+    rows = comparison_result(runs, headlines).tables[0].rows
+    assert list(rows["run"]) == labels
