@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from experiments.actuator.fit import JointFit
 from experiments.reports.value_text import value_text
 
-HEIGHT_IN, WIDTH_IN = 3.4, 3.6  # two next to each other fill the width of a printed page
+HEIGHT_IN, WIDTH_IN = 4.2, 5.0  # two next to each other are as wide as every picture
 SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
 GREY, LIGHT_GREY = "0.45", "0.85"
 BLUE, RED = "#1f5fa8", "#b5322c"

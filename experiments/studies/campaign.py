@@ -4,12 +4,14 @@ The file of the campaign names the walks (experiments/campaign). Their Parquet f
 is written at the end, and also where something ends the campaign early.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from pandas import DataFrame
 
 from experiments.campaign.campaign_file import Campaign, Plates, load_campaign
+from experiments.campaign.plots import draw_speeds
 from experiments.campaign.points import Tables, Values, with_values
 from experiments.campaign.trials_table import write_trials
 from experiments.campaign.walk_trial import BROKEN, run_walk
@@ -17,12 +19,13 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
 from experiments.study.option import Option
 from experiments.study.provenance import program_text, provenance
-from experiments.study.result import Result, Table
+from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from firmware_host.software_version import build_metadata
 from logs.catalogue.entry import TRIALS
 
 SHOWN_POINTS = 30
+SPEEDS = "A dot is a point with its standard deviation over the seeds, a large dot the mean over all points of a value."
 
 
 def folder_name(file: Path) -> str:
@@ -56,7 +59,8 @@ def study(trials: Trials, file: Annotated[Path, Option("in TOML, such as example
         "points": points,
         "simulated": True,
     }
-    return Result([_table(points, len(rows))], summary=summary, title=f"Campaign {campaign.name}")
+    figure = Figure("speeds", SPEEDS, partial(draw_speeds, points), "Speed against each key")
+    return Result([_table(points, len(rows))], [figure], summary=summary, title=f"Campaign {campaign.name}")
 
 
 def walk_point(point: int, seed: int, values: Values, base: Tables, plates: Plates) -> dict[str, Any]:

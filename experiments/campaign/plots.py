@@ -1,0 +1,61 @@
+"""Speed of a campaign's walks against each key that varies: a dot for each point, and the means of each value."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+
+from experiments.reports.style import FAINT, FORWARD
+
+COLUMNS = 3  # of panels
+WIDTH_IN, PANEL_IN = 10.0, 3.0
+FEW = 12  # values of a key that share a mean; of more, as in a random sample, each point stands alone
+DECADE = 10.0  # between the ends of a key on a logarithmic axis, at least
+
+
+def draw_speeds(points: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw the summaries of the points; bars are the standard deviation over the seeds."""
+    keys = list(points[0]["values"])
+    columns = min(COLUMNS, len(keys))
+    rows = -(-len(keys) // columns)
+    figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows), layout="constrained")
+    panels: list[Axes] = list(figure.subplots(rows, columns, sharey=True, squeeze=False).flat)
+    for panel, key in zip(panels, keys, strict=False):
+        _draw_key(panel, key, points)
+    for panel in panels[len(keys) :]:
+        panel.set_axis_off()
+    for panel in panels[::columns]:
+        panel.set_ylabel("speed (cm/s)")
+    panels[0].set_ylim(bottom=0.0)
+    return figure
+
+
+def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> None:
+    values = [point["values"][key] for point in points]
+    is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    names = sorted(set(values)) if is_number else list(dict.fromkeys(map(_text, values)))
+    x = np.array(values, dtype=float) if is_number else np.array([names.index(_text(value)) for value in values])
+    speeds, spread = (
+        np.array([100.0 * point[name] for point in points], dtype=float) for name in ("speed_m_s", "speed_sd_m_s")
+    )
+    panel.errorbar(x, speeds, np.nan_to_num(spread), linestyle="", marker=".", color=FAINT, elinewidth=0.6, alpha=0.7)
+    if len(names) <= FEW:
+        places = np.unique(x)
+        means = [np.nanmean(own) if np.isfinite(own := speeds[x == place]).any() else np.nan for place in places]
+        panel.plot(places, means, "o-" if is_number else "o", color=FORWARD)
+    if not is_number:
+        panel.set_xticks(range(len(names)), names)
+        panel.set_xlim(-0.5, len(names) - 0.5)
+    elif x.min() > 0.0 and x.max() >= DECADE * x.min():
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter("")
+    panel.set_xlabel(key, fontsize="small")
+
+
+def _text(value: Any) -> str:
+    return str(value).rpartition("/")[2] or "-"
