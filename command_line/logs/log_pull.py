@@ -44,9 +44,12 @@ def pull(
         _rsync(source, [*progress, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"])
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
         different = _compare(source, into, logs)
-    except CommandError as problem:
-        copied = len(set(log_files(into, DONE, PRESERVED)) - before)
-        raise CommandError(f"{problem}; {counted(copied, 'new log')} copied, the same command continues") from None
+    except (CommandError, KeyboardInterrupt) as problem:
+        copied = counted(len(set(log_files(into, DONE, PRESERVED)) - before), "new log")
+        status = exit_codes.UNHEALTHY if isinstance(problem, CommandError) else exit_codes.INTERRUPTED
+        raise CommandError(
+            f"{str(problem) or 'stopped'}; {copied} copied, the same command continues", status=status
+        ) from None
     same = [path for path in logs if path.name not in different]
     _mark(source, into, same)
     report = {"folder": str(into), "copied": [path.name for path in same], "different": different}

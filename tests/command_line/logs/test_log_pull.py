@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from tests.command_line.command_lines import run
+from tests.command_line.command_lines import run, run_process
+from tests.folders import ROOT
 
 RSYNC = """#!{python}
-import pathlib, shutil, sys, os
+import pathlib, shutil, signal, sys, os
 *sources, target = [each for each in sys.argv[1:] if not each.startswith("-")]
 target, left = pathlib.Path(target.split(":")[-1]), int(os.environ.get("COPIES", "99"))
 if "--dry-run" in sys.argv:
@@ -24,6 +25,9 @@ for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
         continue
     for log in sorted([*source.glob("done/*.mcap"), *source.glob("kept/*.mcap")]):
         if (left := left - 1) < 0:
+            if "INTERRUPT" in os.environ:
+                os.kill(os.getppid(), signal.SIGINT)
+                signal.pause()
             sys.exit("ssh: connect to host robot port 22: No route to host")
         (target / log.parent.name).mkdir(exist_ok=True)
         shutil.copy2(log, target / log.parent.name)
@@ -57,6 +61,14 @@ def test_finished_logs_are_copied_compared_and_marked_once(robot: Path) -> None:
 def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
     ended = run("log", "pull", f"host:{robot}", "here", COPIES="1")
     assert ended.returncode == exit_codes.UNHEALTHY and "No route to host; 1 new log copied" in ended.stderr
+    assert not (robot / "copied").exists()
+    assert run("log", "pull", f"host:{robot}", "here").returncode == exit_codes.OK
+    assert len(list((robot / "copied").iterdir())) == 3
+
+
+def test_ctrl_c_in_the_middle_costs_no_log(robot: Path) -> None:
+    ended = run_process("log", "pull", f"host:{robot}", "here", COPIES="1", INTERRUPT="1", PYTHONPATH=str(ROOT))
+    assert ended.returncode == exit_codes.INTERRUPTED and "stopped; 1 new log copied" in ended.stderr
     assert not (robot / "copied").exists()
     assert run("log", "pull", f"host:{robot}", "here").returncode == exit_codes.OK
     assert len(list((robot / "copied").iterdir())) == 3

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
 import time
 from pathlib import Path
 
@@ -140,6 +143,22 @@ def test_check_without_a_daemon_checks_what_it_can(
 def test_the_version_and_a_completion_script_are_printed() -> None:
     assert run("--version").stdout.startswith("mudskipper ")
     assert "--attended" in run("--print-completion", "bash").stdout
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [("wa", ["walk", "watch"]), ("log pu", ["pull"]), ("move left", ["left_adduction=", "left_sweep="]),
+     ("walk --de", ["--depth"]), ("init --drive odrive0", ["odrive05"])],
+)  # fmt: skip
+def test_fish_completes_commands_options_and_joints(tmp_path: Path, typed: str, offered: list[str]) -> None:
+    script = tmp_path / "mudskipper.fish"
+    script.write_text(run("--print-completion", "fish").stdout, encoding="utf-8")
+    command = ["fish", "--no-config", "-c", f"source {script}; complete -C 'mudskipper {typed}'"]
+    found = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=os.environ | {"HOME": str(tmp_path)}
+    )
+    assert sorted(line.split("\t")[0] for line in found.stdout.splitlines()) == offered
 
 
 def test_the_command_line_and_the_daemon_agree() -> None:
