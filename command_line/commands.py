@@ -50,6 +50,7 @@ COMMANDS: Mapping[str, Command] = {
     "init": ("init.init.init", "Write a configuration for a new robot, from questions or options."),
     "install": ("install.installation.install", "Set up the service, network and users of this computer."),
     "uninstall": ("install.installation.uninstall", "Undo the installation; configuration and logs stay."),
+    "upgrade": ("install.upgrade.upgrade", "Say what another version's package changes, and install it."),
     "drives": (DRIVES, "Find and set up motor drives, while the daemon does not run."),
     "calibrate": (
         "options.studies.add_calibrate",

@@ -103,16 +103,17 @@ def source_folder() -> Path:
     return in_tree if (in_tree / "mudskipper.service").exists() else installed
 
 
-def load_sources(prefix: Path) -> dict[str, str]:
-    """Return the text of each file by its installed path. Raises OSError."""
-    texts = {path: (source_folder() / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
+def load_sources(prefix: Path, folder: Path | None = None) -> dict[str, str]:
+    """Return the text of each file by its installed path, of this version or from another folder. Raises OSError."""
+    texts = {path: ((folder or source_folder()) / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
     for unit in (UNIT, LIVE_UNIT):
         texts[unit] = texts[unit].replace(DEFAULT_PREFIX, str(prefix))
     return texts
 
 
-def plan_installation(system: System) -> Plan:
-    sources, before = load_sources(system.prefix), _load_manifest(system.root)
+def plan_installation(system: System, folder: Path | None = None) -> Plan:
+    """Plan with the files of this version, or of one in another folder."""
+    sources, before = load_sources(system.prefix, folder), _load_manifest(system.root)
     after = {path: _digest(text) for path, text in sources.items()}
     plan = Plan([], [])
     for path, text in sources.items():

@@ -30,7 +30,7 @@ GUIDE = "docs/how-to/install.md"
 HEADINGS = ("## On the robot", "## Without CAN hardware")  # of the guide, whose commands are run
 DONE_ALREADY = ("apt install", "git clone")  # by base_system.py, and by a copy of this working tree
 NEEDS_A_RUNNING_ROBOT = ("systemctl status", "mudskipper ")
-DISK_MIB = 1500
+DISK_MIB = 2000
 
 
 class Disk(NamedTuple):
@@ -39,16 +39,16 @@ class Disk(NamedTuple):
     initramfs: Path
 
 
-def installed_robot() -> Disk:
-    """Return a disk that was never booted; copy it before booting."""
+def installed_robot(name: str = "robot", last_commands: str = "") -> Disk:
+    """Return a disk that was never booted; copy it before booting. `last_commands` follow those of the guide."""
     install_missing_packages()
     archive = base_system()
-    disk = Disk(STORE / "robot.ext4", STORE / "kernel", STORE / "initramfs")
-    key, mark = _key(archive), STORE / "robot.key"
+    disk = Disk(STORE / f"{name}.ext4", STORE / "kernel", STORE / "initramfs")
+    key, mark = fingerprint(_key(archive).encode(), last_commands.encode()), STORE / f"{name}.key"
     if not mark.exists() or mark.read_text(encoding="utf-8") != key:
         print("Installing the project by the guide's commands (half a minute) ...", flush=True)
         mark.unlink(missing_ok=True)
-        _make_disk(archive, disk)
+        _make_disk(archive, disk, last_commands)
         mark.write_text(key, encoding="utf-8")
     return disk
 
@@ -65,14 +65,14 @@ def _project_files() -> list[Path]:
     return [path for path in paths if path.is_file()]
 
 
-def _make_disk(archive: Path, disk: Disk) -> None:
+def _make_disk(archive: Path, disk: Disk, last_commands: str) -> None:
     work = STORE / "work"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
     with tarfile.open(work / "src.tar", "w") as source:
         for path in _project_files():
             source.add(path, str(Path("opt/mudskipper/src") / path.relative_to(PROJECT)), filter=_owned_by_root)
-    (work / "install.sh").write_text(installation(), encoding="utf-8")
+    (work / "install.sh").write_text(installation() + last_commands, encoding="utf-8")
     _install(archive, work)
     _write_image(work, disk)
     shutil.rmtree(work, ignore_errors=True)

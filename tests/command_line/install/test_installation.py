@@ -95,7 +95,7 @@ def release(monkeypatch: pytest.MonkeyPatch, location: str) -> None:
     """Simulate a new version of the project in which one file has changed."""
     texts = load_sources(PREFIX)
     changed = texts | {location: texts[location] + "# new\n"}
-    monkeypatch.setattr(service_plan, "load_sources", lambda prefix: changed)
+    monkeypatch.setattr(service_plan, "load_sources", lambda prefix, folder=None: changed)
 
 
 def written(plan: Plan) -> list[str]:

@@ -1,0 +1,106 @@
+"""`mudskipper upgrade`: what another version changes, and when it is not installed."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.errors import CommandError
+from command_line.init.key_reference import configuration_keys
+from command_line.install import upgrade as upgrade_module
+from command_line.install.service_plan import DEFAULT_PREFIX, LIVE_UNIT, Outcome, load_sources, source_folder
+from command_line.install.upgrade import key_changes, upgrade
+from control.modes import ENERGISED
+
+PREFIX = Path(DEFAULT_PREFIX)
+
+
+class Computer:
+    """A robot's computer with a package of this version, whose files and answers the test changes."""
+
+    def __init__(self, root: Path) -> None:
+        self.root, self.commands = root, [""]
+        self.keys = [f"{key.section}.{key.name}" for key in configuration_keys()]
+        self.refusal = ""
+        for path, text in load_sources(PREFIX).items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text, encoding="utf-8")
+
+    def run(self, words: Sequence[str]) -> Outcome:
+        self.commands.append(" ".join(words))
+        if words[:2] == ("dpkg-deb", "--extract"):
+            share = Path(words[3] + DEFAULT_PREFIX) / "share" / "mudskipper"
+            share.mkdir(parents=True)
+            for source in source_folder().iterdir():
+                (share / source.name).write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
+            live = share / Path(LIVE_UNIT).name
+            live.write_text(live.read_text(encoding="utf-8") + "# new\n", encoding="utf-8")
+        if "--check-config" in words:
+            return Outcome(exit_codes.CONFIGURATION if self.refusal else 0, self.refusal)
+        return Outcome(0, "\n".join(self.keys) if "-c" in words else "1.0")
+
+    def upgrade(self, check: bool = False) -> int:
+        return upgrade(Path("new.deb"), check=check, socket=Path("/none"), run=self.run, root=self.root)
+
+    @property
+    def installed(self) -> bool:
+        return "dpkg --install new.deb" in self.commands
+
+
+@pytest.fixture
+def computer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Computer:
+    monkeypatch.setattr(sys, "prefix", DEFAULT_PREFIX)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    return Computer(tmp_path)
+
+
+def test_a_check_names_keys_and_files_and_changes_nothing(
+    computer: Computer, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.read_bytes() for path in computer.root.rglob("*") if path.is_file()}
+    computer.keys = [key.replace("faults.silence_s", "faults.silent_s") for key in computer.keys]
+    assert computer.upgrade(check=True) == exit_codes.OK and not computer.installed
+    lines = capsys.readouterr().out.splitlines()
+    assert "keys           faults.silence_s is gone; perhaps it is now faults.silent_s" in lines
+    assert "keys           faults.silent_s is new" in lines
+    assert [line for line in lines if line.startswith("files")] == [
+        f"files          write {computer.root / LIVE_UNIT}.new",
+        f"files          {computer.root / LIVE_UNIT} was edited and stays; the new version is in"
+        " mudskipper-live.service.new next to it",
+    ]  # edited, since no manifest says that this program wrote it
+    assert before == {path: path.read_bytes() for path in computer.root.rglob("*") if path.is_file()}
+
+
+def test_an_upgrade_installs_the_package(computer: Computer) -> None:
+    assert computer.upgrade() == exit_codes.OK and computer.installed
+
+
+@pytest.mark.parametrize("mode", sorted(mode.name.lower() for mode in ENERGISED))
+def test_no_upgrade_while_drives_have_torque(computer: Computer, monkeypatch: pytest.MonkeyPatch, mode: str) -> None:
+    monkeypatch.setattr(upgrade_module, "energised_mode", lambda socket: mode)
+    with pytest.raises(CommandError, match=mode) as refused:
+        computer.upgrade()
+    assert refused.value.status == exit_codes.REFUSED and not computer.installed
+
+
+def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Computer) -> None:
+    computer.refusal = "mudskipperd: faults.silence_s: there is no such key\nmudskipperd: another"
+    with pytest.raises(CommandError, match="silence_s") as refused:
+        computer.upgrade()
+    assert refused.value.status == exit_codes.CONFIGURATION and not computer.installed
+
+
+def test_the_package_refuses_in_the_same_modes() -> None:
+    """The scripts of the package also protect an upgrade by apt or dpkg alone."""
+    script = (Path(__file__).parents[3] / "debian" / "prerm").read_text(encoding="utf-8")
+    (modes,) = [line for line in script.splitlines() if "hold" in line]
+    assert set(modes.rstrip(")").split(" | ")) == {mode.name.lower() for mode in ENERGISED}
+
+
+def test_a_key_that_is_gone_without_a_similar_one_is_named_alone() -> None:
+    assert list(key_changes(["a.b", "log.quota_bytes"], ["a.b"])) == ["log.quota_bytes is gone"]
