@@ -28,12 +28,15 @@ def run_folder() -> Path:
     for parent in _runtime_parents():
         if parent.is_dir() and not _untrusted_level(parent):
             return _private(make_own_folder(parent / NAME))
-    return _linked_folder(Path.home() / LINK)
+    if home := _home():
+        return _linked_folder(home / LINK)
+    raise OSError(errno.ENOENT, "this user has neither a home folder nor a folder in /run/user: set XDG_RUNTIME_DIR")
 
 
 def find_run_folder() -> Path | None:
     """Return the folder if it exists and is private, without making anything."""
-    for folder in (*(parent / NAME for parent in _runtime_parents()), Path.home() / LINK):
+    home = _home()
+    for folder in (*(parent / NAME for parent in _runtime_parents()), *([home / LINK] if home else [])):
         with suppress(OSError):
             return _private(folder.resolve(strict=True))
     return None
@@ -57,6 +60,14 @@ def _runtime_parents() -> list[Path]:
     given = os.environ.get("XDG_RUNTIME_DIR", "")
     parents = [Path(given)] if os.path.isabs(given) else []
     return [*parents, Path(f"/run/user/{user}"), *([Path("/run")] if user == 0 else [])]
+
+
+def _home() -> Path | None:
+    """Return the home folder; None for a user without one, as a service of systemd may have."""
+    try:
+        return Path.home()
+    except RuntimeError:
+        return None
 
 
 def _untrusted_level(folder: Path) -> Path | None:

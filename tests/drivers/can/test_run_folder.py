@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pwd
 import stat
 from pathlib import Path
 
@@ -119,3 +120,14 @@ def test_a_link_to_an_unsafe_folder_is_replaced(home: Path, tmp_path: Path) -> N
     (home / LINK).symlink_to(unsafe)
     assert run_folder() != unsafe
     assert (home / LINK).resolve() == run_folder()
+
+
+def test_a_user_without_a_home_has_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nobody(number: int) -> None:
+        raise KeyError(number)
+
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr(pwd, "getpwuid", nobody)
+    assert find_run_folder() is None
+    with pytest.raises(OSError, match="XDG_RUNTIME_DIR"):
+        run_folder()
