@@ -70,6 +70,18 @@ def test_stop_charts_and_tables_fit(chromium: Chromium, address: str, width: int
     assert all(chromium.run(LAYOUT).values()), chromium.run(LAYOUT)
 
 
+def test_a_note_and_a_marker_are_written_by_their_buttons(chromium: Chromium, address: str) -> None:
+    chromium.open_tab(address)
+    chromium.wait_for(word("walking"))
+    field, written = "document.querySelector('#note input')", "document.getElementById('noted').textContent"
+    chromium.run(f"{field}.value = 'a stone <b>'; document.querySelector('#note button').click()")
+    chromium.wait_for(f"{written}.startsWith('note: ') && {field}.value === ''")
+    chromium.wait_for("document.getElementById('events').textContent.includes('a stone <b>')")
+    chromium.run(f"{field}.value = 'clap'; document.getElementById('mark').click()")
+    chromium.wait_for(f"{written}.startsWith('mark: ')")
+    chromium.wait_for("document.getElementById('events').textContent.includes('clap')")
+
+
 def test_the_last_of_many_pages_stops_the_robot_and_sees_the_daemon_die(
     chromium: Chromium, robot: LocalRobot, address: str
 ) -> None:
