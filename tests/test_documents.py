@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
+import tomlkit
 
 from command_line.init.key_reference import configuration_keys
 from command_line.json_output import SCHEMAS
-from docs.generate.pages import TABLES
+from docs.generate.pages import TABLES, sections
 from experiments.study.catalogue import study_texts
-from tests.folders import ROOT
+from firmware_host.configuration.loading import parse_configuration
+from tests.folders import EXAMPLE_CONFIGURATION, ROOT
 
 LONGEST_README = 9000  # bytes
 
@@ -37,3 +42,21 @@ def test_every_generated_table_has_lines_and_the_configuration_all_keys() -> Non
     texts = {name: "\n".join(lines()) for name, lines in TABLES.items()}
     assert all(text.count("\n") > 5 for text in texts.values())
     assert all(f"| `{key.name}` |" in texts["configuration"] for key in configuration_keys())
+
+
+def test_each_example_of_a_section_is_accepted_by_the_daemon() -> None:
+    whole = tomllib.loads(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8"))
+    examples = re.findall(r"```toml\n(.*?)\n```", "\n".join(sections()), re.DOTALL)
+    assert len(examples) == len({key.section for key in configuration_keys()})
+    for example in examples:
+        copied = _merged(whole, tomllib.loads(example))
+        parse_configuration(tomlkit.dumps(copied))
+
+
+def _merged(into: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `into` with the keys of `given`, table by table."""
+    both = {
+        key: _merged(into[key], value) if isinstance(value, dict) and key in into else value
+        for key, value in given.items()
+    }
+    return {**into, **both}

@@ -4,7 +4,8 @@ They are not checked in: a command, a configuration key, a fault or a log field 
 nowhere else. The pages of docs/reference include them.
 """
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING
 from itertools import groupby
 from pathlib import Path
@@ -18,17 +19,34 @@ from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
 from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, SocketMethod
 
+EXAMPLE = Path(__file__).parents[2] / "systemd" / "mudskipper.toml"
+SECTION = re.compile(r"^(?=\[)", re.MULTILINE)
+COMMENTS_OF_NEXT = re.compile(r"(\n(#.*)?)*\Z")
+TOML_VALUES = (bool, int, float, str, tuple)
 RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
 
 
 def sections() -> Iterator[str]:
-    for section, keys in groupby(configuration_keys(), lambda key: key.section):
+    for section, group in groupby(configuration_keys(), lambda key: key.section):
+        keys = list(group)
         yield f"## [{section}]"
         rows = [_key_row(key) for key in keys]
         if section == "gait":
             names = " or ".join(f'"{name}"' for name in PROTOCOLS)
             rows.insert(0, (code("protocol"), "", names, '`"walking"`', "preset that the other keys change"))
         yield from table(("key", "unit", "bounds", "default", "meaning"), rows)
+        yield from ("", "```toml", example(section, keys), "```", "")
+
+
+def example(section: str, keys: Sequence[Key]) -> str:
+    """Return a section to copy: that of the example configuration, or one with every default."""
+    begin = f"[{section}".replace("NAME", "") if section.endswith(".NAME") else f"[{section}]"
+    given = [part for part in SECTION.split(EXAMPLE.read_text(encoding="utf-8")) if part.startswith(begin)]
+    if given:
+        return COMMENTS_OF_NEXT.sub("", given[0]).strip()
+    known = [key for key in keys if key.default is not MISSING and isinstance(key.default, TOML_VALUES)]
+    head = f"[{section}]".replace("NAME", "left_sweep")
+    return "\n".join([head, *(f"{key.name} = {toml_value(key.default)}" for key in known)])
 
 
 def _key_row(key: Key) -> tuple[str, str, str, str, str]:
