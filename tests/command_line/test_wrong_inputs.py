@@ -30,6 +30,9 @@ WRONG_COMMAND_LINES = [  # and what the message names
     ("walk --depth deep", "deep: must be a number in cm"),
     ("walk --depth 0.001", "from 0.5 to 20 cm"),
     ("walk --depth 0.02", "from 0.5 to 20 cm"),  # m
+    ("joy --depth 0.02", "from 0.5 to 20 cm"),
+    ("joy --device", "--device"),
+    ("upgrade --check", "FILE"),
     ("simulate --world world.toml --mud 48.5", "--mud"),
     ("simulate --mud 48", "48.5"),
     ("simulate --bus a/b", "a/b"),
@@ -121,6 +124,8 @@ MISSING_INPUTS = [
     "experiment campaign /none/x.toml",
     "doctor --config /none/x.toml",
     "check --config /none/x.toml",
+    "upgrade --check /none/x.deb",
+    "joy --device /none/event7",
 ]
 UNREADABLE = [  # and what the message names
     ("log info text.mcap", "text.mcap"),
@@ -130,6 +135,8 @@ UNREADABLE = [  # and what the message names
     ("log open text.mcap --with rerun", "text.mcap"),
     ("log recover text.mcap", "text.mcap"),
     ("log query nonsense .", "nonsense"),
+    ("upgrade text.mcap", "text.mcap"),
+    ("joy --keyboard", "terminal"),
     ("drives find --interface kvaser --channel 0", "kvaser 0"),
     ("drives find --interface slcan --channel /none", "slcan /none"),
 ]
