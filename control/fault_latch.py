@@ -48,13 +48,16 @@ class FaultLatch:
         return self._tick - self._present[fault.name, fault.subject].first_tick
 
     def blocking(self, forced: str = "") -> list[Fault]:
-        """The present faults that block arming; `forced`: the name of the one kind that an operator overrules."""
+        """The present faults that block arming; `forced`: names of kinds that an operator overrules, with commas."""
         if not self._present:
             return []
+        overruled = forced.split(",")
         return [
             fault
             for fault, *_ in self._present.values()
-            if fault.kind.blocks is Blocks.ALWAYS or fault.kind.blocks is Blocks.UNLESS_FORCED and fault.name != forced
+            if fault.kind.blocks is Blocks.ALWAYS
+            or fault.kind.blocks is Blocks.UNLESS_FORCED
+            and fault.name not in overruled
         ]
 
     def update(self, present: Sequence[Fault], energised: bool, clearing: bool = False, ticks: int = 1) -> None:

@@ -219,6 +219,12 @@ class FaultKind(StrEnum):
         "The {subject} drive's watchdog is {setting}; it must trip within {longest_s:g} s.",
         f"set the drive's watchdog to 0.1 s, and save; {SET_UP}",
     )
+    UNCALIBRATED = (
+        "uncalibrated", "calibration", NONE, UNLESS_FORCED, WHEN_GONE, 2,
+        "The sign and torque constant of a joint are not calibrated for its drive.",
+        "Signs and torque constants are not calibrated for the drives of {joints}.",
+        "run 'mudskipper calibrate', or arm with --force uncalibrated",
+    )
     ARMING_FAILED = (
         "arming_failed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 765,
         "A drive did not go into closed loop.", "{subject} did not go into closed loop within {longest_s:g} s.", FIX,

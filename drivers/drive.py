@@ -7,6 +7,7 @@ opposed to its joint. drivers/drive_type.py says what a protocol consists of.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import date
 from math import ceil
 from typing import Annotated, ClassVar, NamedTuple, Protocol
 
@@ -15,6 +16,14 @@ from control.records import UNKNOWN, DriveState
 from drivers.can.frames import Frame
 
 FD = 1 << 29  # above every arbitration id
+
+
+@dataclass(frozen=True)
+class DriveCalibration:
+    """For which drive the sign and the torque constant of a joint were calibrated."""
+
+    date: Annotated[str, Meaning("of the calibration, such as 2026-11-28; empty: there was none")] = ""
+    drive: Annotated[str, Meaning("its serial number; of one without, its bus, node id and model")] = ""
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,10 @@ class DriveParameters:
     serial_number: Annotated[
         str, Meaning("of the drive; the robot is not armed with another one; empty: not compared")
     ] = ""
+    firmware_date: Annotated[
+        str, Meaning("when its firmware was installed, such as 2026-11-24; an older calibration or proof is refused")
+    ] = ""
+    calibrated: DriveCalibration = DriveCalibration()
 
     models: ClassVar[tuple[str, ...]] = ()  # of motors that its protocol distinguishes by a key `model`
     serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive; 0: it reports none
@@ -61,6 +74,27 @@ class DriveParameters:
         """Return whether the drive reports its watchdog, or a trial of it is recorded."""
         return self.reports_settings
 
+    @property
+    def identity(self) -> str:
+        """Return what tells this drive from others, as a record about it names it."""
+        return self.serial_number or f"{self.bus} {self.node_id} {getattr(self, 'model', '')}".rstrip()
+
+    def record_problems(self) -> Iterator[tuple[str, str]]:
+        """Yield why a record is not that of this drive with this firmware: the key with its value, what it must be."""
+        record, remedy = self.calibrated, "run 'mudskipper calibrate', or remove 'calibrated'"
+        for key, value in (("firmware_date", self.firmware_date), ("calibrated.date", record.date)):
+            if value and not is_date(value):
+                yield f"{key} = {value!r}", "must be a date such as 2026-11-24"
+                return
+        if record.drive and not record.date:
+            yield "calibrated.date = ''", "must be the date of the calibration"
+        elif record.date and record.drive != self.identity:
+            other = "it is a calibration of another drive"
+            yield f"calibrated.drive = {record.drive!r}", f"must be {self.identity!r}: {other}; {remedy}"
+        elif record.date and record.date < self.firmware_date:
+            earliest = f"must be at least firmware_date = {self.firmware_date}"
+            yield f"calibrated.date = {record.date}", f"{earliest}: the calibration was of older firmware; {remedy}"
+
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """Yield reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
         if self.current_limit_a < torque_nm / self.torque_constant_nm_a:
@@ -69,6 +103,13 @@ class DriveParameters:
                 f"current_limit_a = {self.current_limit_a}",
                 f"must be at least {needed_a:.2f} for limits.torque_nm = {torque_nm}",
             )
+
+
+def is_date(text: str) -> bool:
+    try:
+        return date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,8 @@ class FaultMonitor:
         self.zeros = tuple(ZeroMonitor(joint, configuration.faults.jump_rad) for joint in joints)
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
+        uncalibrated = ", ".join(joint for joint in joints if not configuration.drive[joint].calibrated.date)
+        self._uncalibrated = [FaultKind.UNCALIBRATED.fault(joints=uncalibrated)] if uncalibrated else []
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
         self._failed_sends = {name: port.failed_sends for name, port in drives.ports.items()}
@@ -151,6 +153,7 @@ class FaultMonitor:
             self._refused_commands = self._drives.refused_commands
             found.append(FaultKind.COMMAND_REFUSED.fault(reason=self._drives.last_refusal))
         self._check_drives(found, health, monitor_input.mode)
+        found += self._uncalibrated
         self._check_pose(found, tick.now_s, monitor_input.body)
         return found
 

@@ -71,7 +71,7 @@ class Loop:
         self.health = Health()
         self.missed_ticks = 0  # since the start
         self.ending = False  # the daemon is about to end: nothing is armed any more
-        self.forced = ""  # the kind of fault against which the robot was armed by force
+        self.forced = ""  # the kinds of faults against which the robot was armed by force, with commas
         self.pending_request = Request.NONE  # for the next tick
         self._clearing_until_s = NEVER_S
         self._mode_since_s = 0.0
@@ -276,7 +276,7 @@ class Loop:
             self.drives.clear_errors()
             self._clearing_until_s = now_s + CLEARING_S
         elif request is Request.ARM:
-            overruled = [fault for fault in self.faults.blocking() if fault.name == forced]
+            overruled = [fault for fault in self.faults.blocking() if fault.name in forced.split(",")]
             self.events.report_overruled(now_s, overruled)
             self.forced = forced if overruled else ""
         if order is not None:
@@ -301,7 +301,7 @@ class Loop:
     def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):
             return "the daemon is ending"
-        if forced and forced not in OVERRULED_BY_FORCE:
+        if forced and not set(forced.split(",")) <= set(OVERRULED_BY_FORCE):
             return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
         deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
         if order is not None and not 0.0 < order.depth_m <= deepest_m:

@@ -68,7 +68,7 @@ class Client:
         return pieces
 
     def arm(self, force: str = "") -> None:
-        """Energise the joints; `force` names the one kind of fault to overrule, such as watchdog_unknown."""
+        """Energise the joints; `force` names the kind of fault to overrule, such as uncalibrated."""
         self._move("arm", force=force)
 
     def walk(self, strides: int = 0, depth_m: float | None = None, **trial: object) -> None:

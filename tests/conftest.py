@@ -11,8 +11,9 @@ import pytest
 from hypothesis import settings
 
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import load_configuration
-from tests.folders import ROOT
+from firmware_host.configuration.loading import parse_configuration
+from simulation.harness.drive_presets import calibrated
+from tests.folders import EXAMPLE_CONFIGURATION
 from tests.recorded_walks import record_walks
 from tests.running_bench import Bench, SharedBench, running_bench
 
@@ -44,12 +45,13 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def example_text() -> str:
     """Returns the text of the example configuration."""
-    return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+    return EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")
 def configuration() -> Configuration:
-    return load_configuration(ROOT / "systemd" / "mudskipper.toml")
+    """Return the example's configuration, of a robot that is simulated."""
+    return parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from control.records import Rig
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from simulation.harness.drive_presets import DRIVES, with_drive_type
+from simulation.harness.drive_presets import DRIVES, calibrated, with_drive_type
 
 EXAMPLE = Path(__file__).parent.parent / "systemd" / "mudskipper.toml"
 
@@ -19,7 +19,7 @@ def require_drive(drive: str) -> None:
 
 
 def load_example(drive: str = DEFAULT) -> Configuration:
-    return parse_configuration(with_drive_type(EXAMPLE.read_text(encoding="utf-8"), drive), EXAMPLE)
+    return parse_configuration(calibrated(with_drive_type(EXAMPLE.read_text(encoding="utf-8"), drive)), EXAMPLE)
 
 
 def load_one_flipper(drive: str = DEFAULT) -> Configuration:

@@ -65,7 +65,9 @@ def arm(
     *,
     socket: Socket,
     json: Json = False,
-    force: Annotated[str, Option("overrule this one check, such as watchdog_unknown", metavar="CHECK")] = "",
+    force: Annotated[
+        str, Option("overrule this check, such as uncalibrated; several with commas", metavar="CHECK")
+    ] = "",
     wait: Annotated[bool, Option("wait up to 30 s for what ends by itself, such as a joint that moves")] = False,
     take_over: TakeOver = False,
 ) -> int:

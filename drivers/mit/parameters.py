@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
 from functools import cached_property
 from typing import Annotated, ClassVar
 
 from control.bounds import Bounds, Meaning
-from drivers.drive import DriveParameters
+from drivers.drive import DriveParameters, is_date
 from drivers.mit.models import MODELS, Model
 
 LARGEST_ID = 15  # an answer has four bits for it
@@ -41,9 +40,6 @@ class MitParameters(DriveParameters):
         float, Bounds(0.001, 10.0), Meaning("by which its answers state torque: current is that torque divided by it")
     ] = 0.083
 
-    firmware_date: Annotated[
-        str, Meaning("when its firmware was installed, such as 2026-11-24; an older proof counts no more")
-    ] = ""
     proven_watchdog: ProvenWatchdog = ProvenWatchdog()
 
     models: ClassVar[tuple[str, ...]] = tuple(MODELS)
@@ -76,7 +72,6 @@ class MitParameters(DriveParameters):
         if range_rad_s != AS_DELIVERED and range_rad_s < SMALLEST_RAD_S:
             bounds = f"{SMALLEST_RAD_S:g} to {LARGEST_RAD_S:g}"
             yield f"velocity_range_rad_s = {range_rad_s:g}", f"must be {bounds}, or -1 for that of the model"
-        yield from self._proof_problems()
         if self.serial_number and not self.reports_settings:
             yield f"serial_number = {self.serial_number!r}", f"must be empty: that of an {self.model} cannot be read"
         if self.torque_range_nm and not MODELS[self.model].has_registers:
@@ -87,13 +82,12 @@ class MitParameters(DriveParameters):
             reason = f"its codes end at {self.ranges.torque_nm:g} N·m, and limits.torque_nm = {torque_nm}"
             yield f"{key} = {value}", reason
 
-    def _proof_problems(self) -> Iterator[tuple[str, str]]:
-        """Yield why a proof is not that of this drive with this firmware."""
+    def record_problems(self) -> Iterator[tuple[str, str]]:
+        yield from super().record_problems()
         proof = self.proven_watchdog
-        for key, value in (("firmware_date", self.firmware_date), ("proven_watchdog.date", proof.date)):
-            if value and not is_date(value):
-                yield f"{key} = {value!r}", "must be a date such as 2026-11-24"
-                return
+        if proof.date and not is_date(proof.date):
+            yield f"proven_watchdog.date = {proof.date!r}", "must be a date such as 2026-11-24"
+            return
         if not proof.watchdog_s:
             return
         if self.reports_settings:
@@ -108,10 +102,3 @@ class MitParameters(DriveParameters):
         elif proof.date < self.firmware_date:
             earliest = f"must be at least firmware_date = {self.firmware_date}"
             yield f"proven_watchdog.date = {proof.date}", f"{earliest}: the trial was of older firmware; repeat it"
-
-
-def is_date(text: str) -> bool:
-    try:
-        return date.fromisoformat(text).isoformat() == text
-    except ValueError:
-        return False

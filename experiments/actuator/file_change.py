@@ -56,6 +56,10 @@ def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: Any) 
     body = table.value.body if isinstance(table, Table) and path[-1] not in table else []
     trailing = list(reversed([*takewhile(lambda item: item[0] is None, reversed(body))]))
     del body[len(body) - len(trailing) :]
+    if isinstance(value, Mapping):
+        inline = tomlkit.inline_table()
+        inline.update(value)
+        value = inline
     table[path[-1]] = value
     body.extend(trailing)
 

@@ -22,7 +22,7 @@ from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.drive import DriveParameters
+from drivers.drive import DriveCalibration, DriveParameters
 from drivers.drive_types import collisions, make_drives, type_of
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_errors import BenchError
@@ -54,7 +54,7 @@ class HardwareRig:
 
     def __init__(self, configuration: Configuration) -> None:
         refuse_beside_daemon(Path(configuration.status.socket))
-        self.configuration = configuration
+        self.configuration = configuration = on_bench(configuration)
         with ExitStack() as stack:
             try:
                 stack.enter_context(lock_buses(configuration.bus, BusRole.COMMANDS))
@@ -86,6 +86,15 @@ class HardwareRig:
         gc.enable()
         with suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def on_bench(configuration: Configuration) -> Configuration:
+    """Return a configuration that arms before it is calibrated, since the bench is where that happens."""
+    drives = {
+        joint: replace(drive, calibrated=DriveCalibration(date="bench", drive=drive.identity))
+        for joint, drive in configuration.drive.items()
+    }
+    return replace(configuration, drive=drives)
 
 
 def refuse_beside_daemon(socket: Path) -> None:
@@ -142,8 +151,8 @@ class SimulatedRig:
         seed: int = 1,
         others: Sequence[Callable[[SimulatedRig], None]] = (),
     ) -> None:
-        self.configuration = configuration
         built = built or configuration
+        self.configuration = configuration = on_bench(configuration)
         self.buses = {name: MockBus() for name in configuration.bus}
         world = on_blocks(built)
         self.robot = SimulatedRobot(

@@ -11,7 +11,7 @@ from experiments.actuator.file_change import changed_text
 from experiments.actuator.fit import JointFit, fit_joint
 from experiments.actuator.plan import Plan
 from experiments.actuator.report import list_left_out, list_remarks
-from experiments.calibration.drive_identities import Identities, identify_drives
+from experiments.calibration.drive_identities import Identities, calibration_records, identify_drives
 from experiments.calibration.hand_steps import HandSteps, hand_changes
 from experiments.calibration.report import arm_changes, report_calibration
 from experiments.calibration.robots import CalibratedRobot
@@ -36,11 +36,15 @@ class Calibration:
         """Calibrate the joints, and change the configuration file if the operator agrees. Raises BenchError."""
         drives, notebook = self._move_by_hand(operator)
         changes: dict[tuple[str, ...], Any] = hand_changes(self.configuration, notebook.entries)
-        corrected = parse_configuration(changed_text(self.configuration.text, changes))
+        begun = notebook.entries["begun"]["date"]
+        in_advance = calibration_records(self.configuration, drives, drives, begun)  # the weights' daemon must arm
+        corrected = parse_configuration(changed_text(self.configuration.text, changes | in_advance))
         self._try_torques(corrected, notebook)
         readings, logs = self.robot.weigh(corrected, self.plan)
         fits = [fit for joint in self.plan.joints if (fit := self._fit(joint, readings[joint], corrected)) is not None]
-        changes |= fitted_changes(fits, self.session) | arm_changes(self.configuration, self.plan, fits)
+        changes |= (fitted := fitted_changes(fits, self.session)) | arm_changes(self.configuration, self.plan, fits)
+        done = [joint for joint in self.plan.joints if ("drive", joint, "torque_constant_nm_a") in fitted]
+        changes |= calibration_records(self.configuration, drives, done, begun)
         applied, ending = apply_changes(target, changes, self.session)
         weighed, simulated = (self.plan, readings, fits), self.session.simulated
         result = report_calibration(drives, notebook.entries, corrected, weighed, applied, simulated)

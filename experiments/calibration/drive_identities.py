@@ -1,11 +1,17 @@
 """The drives that are found on the buses: where they are, what they are, and their own numbers."""
 
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
 from control.rate import PERIOD_S
 from experiments.bench.measured_check import measure_check
 from experiments.bench.test_rig import TestRig
 from experiments.bench.wiring_check import ASKING_S, CHECKS
 from experiments.robot.bench_errors import BenchError
+from firmware_host.configuration.configuration import Configuration
 
+Changes = dict[tuple[str, ...], Any]
 Identities = dict[str, dict[str, str | int]]  # by joint
 
 
@@ -31,3 +37,15 @@ def identify_drives(test_rig: TestRig) -> Identities:
         }
         for joint, drive in test_rig.configuration.drive.items()
     }
+
+
+def calibration_records(configuration: Configuration, drives: Identities, joints: Iterable[str], date: str) -> Changes:
+    """Return the keys that say for which drives these joints were calibrated."""
+    changes: Changes = {}
+    for joint in joints:
+        number, drive = str(drives[joint]["serial_number"]), configuration.drive[joint]
+        if number.strip("0"):  # one of zeros is none
+            changes["drive", joint, "serial_number"] = number
+            drive = replace(drive, serial_number=number)
+        changes["drive", joint, "calibrated"] = {"date": date, "drive": drive.identity}
+    return changes

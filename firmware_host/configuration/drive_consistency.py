@@ -44,7 +44,8 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
         if not re.fullmatch(f"([0-9a-f]{{{digits}}})?", drive.serial_number):
             must = f"must be {digits} hexadecimal digits in lower case" if digits else "must be empty: it reports none"
             yield f"drive.{joint}.serial_number = {drive.serial_number!r}: {must}"
-        for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
+        torque_problems = drive.torque_problems(configuration.limits.torque_nm)  # it would clamp without a report
+        for value, problem in (*torque_problems, *drive.record_problems()):
             yield f"drive.{joint}.{value}: {problem}"
     for first, second, identifier in collisions(configuration.drive):
         one, other = configuration.drive[first], configuration.drive[second]

@@ -267,7 +267,9 @@ METHODS: dict[str, SocketMethod] = {
         Level.DRIVE,
         "Switch torque on and hold the present pose.",
         (
-            Parameter("force", Type.TEXT, "the one kind of fault to overrule, such as watchdog_unknown", default=""),
+            Parameter(
+                "force", Type.TEXT, "the kinds of fault to overrule, such as uncalibrated, with commas", default=""
+            ),
             *LEASE,
         ),
     ),

@@ -5,6 +5,7 @@ know are left out, buses get a data bit rate where its frames need one, and driv
 gains.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any, get_type_hints
 
@@ -19,6 +20,7 @@ DRIVES = (  # types of drive, and models of motor
     *(f"{name}:{model}" for name, each in DRIVE_TYPES.items() for model in each.parameters.models),
 )
 DATA_BIT_RATE_KBIT_S = 5000
+CALIBRATED = "2026-11-28"  # the date of every emulated drive's record
 
 
 def with_drive_type(text: str, drive: str, **settings: float) -> str:
@@ -49,4 +51,23 @@ def with_drive_type(text: str, drive: str, **settings: float) -> str:
         gains = document.setdefault("gains", tomlkit.table())
         for key, gain in asdict(GAINS_OF_ASKED_DRIVES).items():
             gains.setdefault(key, gain)
+    if any("calibrated" in table for table in document["drive"].values()):
+        mark_calibrated(document)
     return tomlkit.dumps(document)
+
+
+def calibrated(text: str) -> str:
+    """Return the text of a configuration whose emulated drives are those that it was calibrated for."""
+    document: dict[str, Any] = tomlkit.parse(text)
+    mark_calibrated(document)
+    return tomlkit.dumps(document)
+
+
+def mark_calibrated(document: Mapping[str, Any]) -> None:
+    """Write the record of a calibration for every drive: emulated drives are built as the configuration says."""
+    for table in document["drive"].values():
+        given = {key: table[key] for key in ("bus", "node_id", "serial_number", "model") if key in table}
+        record = tomlkit.inline_table()
+        identity = DRIVE_TYPES[table.get("type", DEFAULT)].parameters(**given).identity
+        record.update({"date": CALIBRATED, "drive": identity})
+        table["calibrated"] = record

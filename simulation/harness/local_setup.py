@@ -15,6 +15,7 @@ import tomlkit
 from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
 from simulation.devices.drive_types import PUBLISHED_NUMBERS
+from simulation.harness.drive_presets import mark_calibrated
 
 HEAD = """\
 # A robot whose drives are simulated on local buses.
@@ -35,6 +36,7 @@ bus = "{bus}"
 node_id = {node_id}
 sign = {sign}
 command_delay_s = 0.25
+calibrated = {{ date = "2026-11-28", drive = "{bus} {node_id}" }}
 
 """
 FRICTION = """\
@@ -91,7 +93,8 @@ def configuration_template(rig: Rig = TWO_FLIPPERS) -> str:
     parts += [BUS.format(name=flipper, channel=f"{{{flipper}}}") for flipper in rig.flippers]
     for joint in rig.joints:
         node_id, sign = WIRED[joint]
-        parts.append(DRIVE.format(joint=joint, bus=joint.split("_")[0], node_id=node_id, sign=sign))
+        drive = DRIVE.format(joint=joint, bus=joint.split("_")[0], node_id=node_id, sign=sign)
+        parts.append(drive.replace("{", "{{").replace("}", "}}"))
     parts.append("# As a calibration of these joints would show.\n")
     parts += [FRICTION.format(joint=joint) for joint in rig.joints]
     return "".join([*parts, TAIL])
@@ -146,9 +149,10 @@ def _paths(folder: Path, logs: Path) -> dict[str, str]:
 def local_copy(text: str, folder: Path, logs: Path) -> str:
     """Return a robot's configuration for this computer: local buses, and sockets, bounds and logs as of `simulate`.
 
-    Geometry, drives, gait, limits and gains stay those of the robot.
+    Geometry, drives, gait, limits and gains stay those of the robot, and its emulated drives are calibrated.
     """
     document: dict[str, Any] = tomlkit.parse(text)
+    mark_calibrated(document)
     for number, bus in enumerate(document["bus"].values()):
         bus.pop("options", None)
         bus |= {"interface": "mudskipper_local", "channel": str(make_own_folder(folder / f"bus{number}"))}

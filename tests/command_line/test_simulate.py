@@ -18,6 +18,7 @@ from firmware_host.configuration.loading import load_configuration, parse_config
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.blocks import RESTING_RAD
+from simulation.harness.drive_presets import calibrated
 from simulation.harness.local_setup import configuration_text, named_folder, write_local_setup
 from tests.folders import ROOT
 
@@ -137,7 +138,7 @@ def test_any_configuration_is_simulated_on_local_buses(
     assert main(["simulate", "--config", "robot.toml", "--local"]) == exit_codes.OK
     path = named_folder(shared.SIMULATED) / "mudskipper.toml"
     assert f"mudskipperd --config {path}" in capsys.readouterr().out
-    local, robot = load_configuration(path), parse_configuration(text)
+    local, robot = load_configuration(path), parse_configuration(calibrated(text))
     assert {bus.interface for bus in local.bus.values()} == {"mudskipper_local"}
     assert (local.drive, local.geometry, local.gait) == (robot.drive, robot.geometry, robot.gait)
     assert main(["simulate", "--reset"]) == exit_codes.UNHEALTHY  # it has ended

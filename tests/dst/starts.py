@@ -17,7 +17,7 @@ from control.modes import ENERGISED, Mode, Request
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from simulation.harness.drive_presets import with_drive_type
+from simulation.harness.drive_presets import calibrated, with_drive_type
 from simulation.harness.world import World
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
@@ -25,7 +25,7 @@ from simulation.mud.stones import Stone
 from simulation.mud.track import Track
 from tests.copied_robots import copy_of
 from tests.dst.scenario import Surroundings
-from tests.folders import ROOT
+from tests.folders import EXAMPLE_CONFIGURATION
 from verification.behaviour import RowList
 from verification.faults.failing_robot import FailingRobot
 
@@ -65,7 +65,7 @@ class RecordedRobot(FailingRobot):
 
 @lru_cache(maxsize=1)
 def _example() -> str:
-    return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+    return calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8"))
 
 
 def configuration_of(surroundings: Surroundings) -> Configuration:

@@ -18,12 +18,14 @@ from control.fault_causes import group_by_cause
 from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
-from control.records import Phase
+from control.records import JOINTS, Phase
 from drivers.fault_injection.failure_table import BY_NAME
 from drivers.power_switch import EmergencyStopParameters, PowerSwitch
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from simulation.devices.drive import DriveError
 from simulation.devices.odrive.device import SimulatedOdrive
+from simulation.harness.drive_presets import with_drive_type
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -366,6 +368,27 @@ def test_arming_by_force_logs_every_overruled_fault(unread: Robot) -> None:
     overruled = [text for text in unread.recorder.texts if text.startswith("armed by force despite ")]
     assert len(overruled) == 1 and "watchdog_unknown" in overruled[0] and "right_sweep" in overruled[0]
     assert "request arm by force against watchdog_unknown" in unread.recorder.texts
+
+
+def test_a_robot_that_is_not_calibrated_is_armed_only_with_a_waiver(example_text: str) -> None:
+    robot = Robot(parse_configuration(example_text))
+    robot.run_for(1.5)
+    assert {fault.name for fault in robot.loop.faults.blocking()} == {"uncalibrated"}
+    refused = robot.loop.request(Request.ARM, robot.now_s)
+    assert refused is not None and all(joint in refused for joint in JOINTS)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated") is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
+    assert robot.loop.forced and "uncalibrated" in {fault.name for fault in robot.loop.faults.present}
+
+
+def test_two_checks_are_overruled_by_name(example_text: str) -> None:
+    """As those of motors that report no watchdog and are not calibrated."""
+    robot = Robot(parse_configuration(with_drive_type(example_text, "mit:AK80-9")))
+    robot.run_for(1.5)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated") is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated,watchdog_unknown") is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
 
 
 @pytest.mark.parametrize("name", ["drive_silent", "everything", "disk_low"])

@@ -13,12 +13,13 @@ from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import Recorder
 from logs.replay import replay_files
+from simulation.harness.drive_presets import calibrated
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
-from tests.folders import ROOT
+from tests.folders import EXAMPLE_CONFIGURATION
 
 STRIDES = 2
 ALL = 1000
@@ -27,7 +28,8 @@ NONE = 0  # no unit until the next insertion needs the choice, as in a swing tha
 
 @cache
 def walked(units_per_tick: int) -> Lockstep:
-    robot = Lockstep(load_configuration(ROOT / "systemd" / "mudskipper.toml"), paper_track(), seed=5)
+    configuration = parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
+    robot = Lockstep(configuration, paper_track(), seed=5)
     robot.loop.learning.units_per_tick = units_per_tick
     robot.arm()
     robot.walk(WalkOrder(0.04, True, STRIDES))

@@ -14,13 +14,13 @@ from drivers.drive import DriveParameters
 from drivers.mit.parameters import MitParameters, ProvenWatchdog
 from drivers.moteus import codec
 from firmware_host.configuration.loading import parse_configuration
-from simulation.harness.drive_presets import with_drive_type
+from simulation.harness.drive_presets import calibrated, with_drive_type
 from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.folders import ROOT
+from tests.folders import EXAMPLE_CONFIGURATION
 
-EXAMPLE = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+EXAMPLE = calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8"))
 TRACK = Track([(3.0, MUDS["48.5"])])
 STRIDES = 3
 
@@ -70,7 +70,7 @@ def test_the_mud_is_the_same_with_any_drives(types: tuple[str, str], mud: Mappin
 
 
 def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
-    text = with_drive_type(EXAMPLE, "mit").replace('type = "mit"', 'type = "mit"\nmodel = "AK80-9"')
+    text = with_drive_type(EXAMPLE, "mit:AK80-9")
     robot = robot_with(text)
     robot.run_for(1.0)
     assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.WATCHDOG_UNKNOWN}
@@ -82,7 +82,7 @@ def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
 
 
 def test_drives_whose_watchdog_is_proven_are_armed_without_force() -> None:
-    text = with_drive_type(EXAMPLE, "mit").replace('type = "mit"', 'type = "mit"\nmodel = "AK80-9"')
+    text = with_drive_type(EXAMPLE, "mit:AK80-9")
     configuration = parse_configuration(text)
     proven: dict[str, DriveParameters] = {
         joint: replace(drive, proven_watchdog=ProvenWatchdog(0.3, drive.bus, drive.node_id, "AK80-9", "2026-11-24"))

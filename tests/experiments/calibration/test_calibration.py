@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from control.records import JOINTS
+from drivers.drive import DriveCalibration
 from experiments.actuator.configuration_change import find_target
 from experiments.actuator.file_change import changed_text
 from experiments.actuator.friction import Loop
@@ -31,7 +34,8 @@ from tests.scripted_operator import ScriptedOperator
 
 JOINT = "right_adduction"
 PLAN = Plan((JOINT,), weights_g=(200.0, 400.0), trials=2, trusts_constant=False)
-CONFIGURATION = simulated_configuration()
+UNCALIBRATED: dict[tuple[str, ...], Any] = {("drive", joint, "calibrated"): {} for joint in JOINTS}
+CONFIGURATION = parse_configuration(changed_text(simulated_configuration().text, UNCALIBRATED))
 TRUE_NM_A = 0.065
 LOOPS = [Loop(0.2, 0.2, quick, 0.8)._asdict() for quick in (False, False, True, True)]
 
@@ -113,6 +117,8 @@ def test_the_configuration_gets_what_was_found(case: Case) -> None:
     assert drive.sign == -1
     assert drive.torque_constant_nm_a == pytest.approx(TRUE_NM_A, rel=0.01)
     assert changed(case).arm.arm_mass_kg == pytest.approx(0.8 * TRUE_NM_A / (9.81 * 0.06), rel=0.01)
+    assert drive.calibrated == DriveCalibration(date.today().isoformat(), "3854345a3133")
+    assert not changed(case).drive["left_sweep"].calibrated.date  # it was not calibrated
     numbers = result.json()
     assert numbers["operator"] == "Ada" and numbers["drives"][JOINT]["serial_number"] == "3854345a3133"
 

@@ -31,7 +31,8 @@ CUBEMARS = simulated_configuration(drive_type="mit:AK80-9")
 
 
 def with_changes(configuration: Configuration, changes: Changes) -> Configuration:
-    return parse_configuration(changed_text(configuration.text, changes))
+    uncalibrated = {("drive", joint, "calibrated"): {} for joint in JOINTS}  # a record belongs to one node id
+    return parse_configuration(changed_text(configuration.text, {**uncalibrated, **changes}))
 
 
 def move_by_hand(

@@ -15,6 +15,7 @@ from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Config
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 from firmware_host.daemon import main
+from simulation.harness.drive_presets import calibrated
 
 
 def problems_of(text: str) -> list[str]:
@@ -33,7 +34,7 @@ def test_the_example_is_valid_and_names_all_joints(configuration: Configuration,
     assert set(configuration.drive) == set(JOINTS)
     assert configuration.torque_constants_nm_a == (0.083, 0.083, 0.083, 0.083)
     typed = example_text.replace("[drive.left_sweep]", '[drive.left_sweep]\ntype = "odrive"')
-    assert parse_configuration(typed).drive == configuration.drive
+    assert parse_configuration(calibrated(typed)).drive == configuration.drive
 
 
 def test_the_example_states_the_defaults(configuration: Configuration) -> None:
@@ -108,6 +109,22 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
             ("left", 5, "AK80-9", "", "date = '': must be the date of the trial"),
         )
     ],
+    *[
+        ("[drive.left_sweep]", f'[drive.left_sweep]\n{keys}', [f"drive.left_sweep.{problem}"])
+        for keys, problem in (
+            ('calibrated = { date = "2026-11-28", drive = "left 1" }', "calibrated.drive = 'left 1': must be 'left 0'"),
+            ('calibrated = { date = "2026-11-28", drive = "left 0" }\nserial_number = "385f324d3037"',
+             "calibrated.drive = 'left 0': must be '385f324d3037'"),
+            ('calibrated = { drive = "left 0" }', "calibrated.date = '': must be the date of the calibration"),
+            ('calibrated = { date = "28.11.26", drive = "left 0" }', "calibrated.date = '28.11.26': must be a date"),
+            ('calibrated = { date = "2026-11-28", drive = "left 0" }\nfirmware_date = "2026-11-29"',
+             "calibrated.date = 2026-11-28: must be at least firmware_date = 2026-11-29"),
+        )
+    ],
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\n'
+     'calibrated = { date = "2026-11-28", drive = "left 5 AK60-6" }', [
+        "drive.left_sweep.calibrated.drive = 'left 5 AK60-6': must be 'left 5 AK80-9'"
+    ]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nproven_watchdog = { watchdog_s = 0.3 }', [
         "drive.left_sweep.proven_watchdog.watchdog_s = 0.3: must be 0: a DM4310 reports its own"
     ]),
