@@ -222,8 +222,9 @@ class FaultKind(StrEnum):
     UNCALIBRATED = (
         "uncalibrated", "calibration", NONE, UNLESS_FORCED, WHEN_GONE, 2,
         "The sign and torque constant of a joint are not calibrated for its drive.",
-        "Signs and torque constants are not calibrated for the drives of {joints}.",
-        "run 'mudskipper calibrate', or arm with --force uncalibrated",
+        "Signs and torque constants are not calibrated for the drives of {joints}: run 'mudskipper calibrate', or go"
+        " without by 'mudskipper arm --force uncalibrated'.",
+        "calibrate the robot; see docs/how-to/calibrate.md",
     )
     ARMING_FAILED = (
         "arming_failed", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 765,

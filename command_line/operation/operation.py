@@ -65,9 +65,7 @@ def arm(
     *,
     socket: Socket,
     json: Json = False,
-    force: Annotated[
-        str, Option("overrule this check, such as uncalibrated; several with commas", metavar="CHECK")
-    ] = "",
+    force: Annotated[str, Option("overrule this check, such as uncalibrated (or A,B)", metavar="CHECK")] = "",
     wait: Annotated[bool, Option("wait up to 30 s for what ends by itself, such as a joint that moves")] = False,
     take_over: TakeOver = False,
 ) -> int:

@@ -16,10 +16,10 @@ Identities = dict[str, dict[str, str | int]]  # by joint
 
 
 def identify_drives(test_rig: TestRig) -> Identities:
-    """Check the wiring, and return every drive. Raises BenchError with all that is wrong."""
-    problems = [measure_check(test_rig, check).problem for check in CHECKS]
-    if any(problems):
-        raise BenchError("\n".join(filter(None, problems)))
+    """Check the wiring, and return every drive. Raises BenchError with what is wrong."""
+    for check in CHECKS:
+        if problem := measure_check(test_rig, check).problem:
+            raise BenchError(problem)
     numbered = [drive.reports_settings and drive.serial_digits for drive in test_rig.configuration.drive.values()]
     for _ in range(round(ASKING_S / PERIOD_S)):
         health = {each.joint: each for each in test_rig.drives.health}

@@ -107,7 +107,7 @@ class HandSteps:
         paths_rad = [max(each) - min(each) for each in zip(*map(measured_angles, self._states()), strict=True)]
         paths = dict(zip(self._rig.joints, paths_rad, strict=True))
         other = max(paths, key=lambda each: paths[each])
-        if other != joint:
+        if other != joint and paths[other] > LEAST_TURN_RAD:
             return (
                 f"{other} turned instead of {joint}: turn the right one, else exchange the node ids (or buses) of both."
             )
@@ -148,7 +148,8 @@ class HandSteps:
     def _angle_at_rest(self, joint: str) -> float | None:
         """Return nothing where the joint moves."""
         index = self._rig.joints.index(joint)
-        angles_rad = [sample.states[index].angle_rad for sample in self._test_rig.run_for(STILL_S)]
+        self._stretches.append(self._test_rig.run_for(STILL_S))
+        angles_rad = [sample.states[index].angle_rad for sample in self._stretches[-1]]
         return None if max(angles_rad) - min(angles_rad) > STILL_RAD else fmean(angles_rad)
 
 

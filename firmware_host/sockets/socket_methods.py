@@ -267,9 +267,7 @@ METHODS: dict[str, SocketMethod] = {
         Level.DRIVE,
         "Switch torque on and hold the present pose.",
         (
-            Parameter(
-                "force", Type.TEXT, "the kinds of fault to overrule, such as uncalibrated, with commas", default=""
-            ),
+            Parameter("force", Type.TEXT, "the kinds of fault to overrule, such as uncalibrated (or A,B)", default=""),
             *LEASE,
         ),
     ),

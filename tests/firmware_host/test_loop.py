@@ -20,7 +20,7 @@ from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError
 from simulation.devices.simulated_drive import SimulatedDrive
-from simulation.harness.drive_presets import with_drive_type
+from simulation.harness.drive_presets import calibrated, with_drive_type
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
@@ -248,7 +248,7 @@ def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot
 def test_only_an_arming_that_overruled_a_fault_counts_as_forced(
     example_text: str, drive_type: str, overruled: str
 ) -> None:
-    robot = Lockstep(parse_configuration(with_drive_type(example_text, drive_type)), FIRM)
+    robot = Lockstep(parse_configuration(calibrated(with_drive_type(example_text, drive_type))), FIRM)
     robot.run_for(1.0)
     assert (robot.loop.request(Request.ARM, robot.now_s) is not None) is bool(overruled)  # its watchdog cannot be read
     robot.arm(forced="watchdog_unknown")
@@ -314,7 +314,7 @@ def test_a_stop_does_not_cancel_a_clear_that_waits_for_the_drives(robot: Lockste
 
 
 def test_four_drives_on_one_bus_walk_as_well(example_text: str) -> None:
-    text = example_text.replace('bus = "right"', 'bus = "left"')
+    text = calibrated(example_text.replace('bus = "right"', 'bus = "left"'))
     robot = Lockstep(parse_configuration(text), FIRM)
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 1))

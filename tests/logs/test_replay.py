@@ -21,6 +21,7 @@ from firmware_host.log.recorder import Recorder
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_logs
 from logs.replay import replay_files
+from simulation.harness.drive_presets import calibrated
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.folders import ROOT, SHARED_DATA
@@ -51,7 +52,7 @@ def test_a_log_carries_the_shape_of_the_plate(tmp_path: Path, example_text: str,
     lines = [line for line in example_text.splitlines() if not line.startswith(("plate_width_m", "plate_height_m"))]
     text = "\n".join(lines).replace("[geometry]", f"[geometry]\nplate_corners_m = {toml_value(corners)}")
     path = tmp_path / "walk.mcap"
-    robot = record_walks(path, parse_configuration(text), 1)
+    robot = record_walks(path, parse_configuration(calibrated(text)), 1)
     live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_files([path]).strides
     assert len(live) == len(replayed) > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ CUBEMARS = simulated_configuration(drive_type="mit:AK80-9")
 
 
 def with_changes(configuration: Configuration, changes: Changes) -> Configuration:
-    uncalibrated = {("drive", joint, "calibrated"): {} for joint in JOINTS}  # a record belongs to one node id
+    uncalibrated: Changes = {("drive", joint, "calibrated"): {} for joint in JOINTS}  # a record belongs to one node id
     return parse_configuration(changed_text(configuration.text, {**uncalibrated, **changes}))
 
 
@@ -76,6 +76,35 @@ def test_a_limit_beyond_a_stop_is_narrowed_to_one_degree_before_it(tmp_path: Pat
     wide = with_changes(CONFIGURATION, {("limits", "sweep_max_deg"): 110.0})
     found = hand_changes(wide, move_by_hand(tmp_path, wide, {}, "left_sweep"))
     assert found == {("limits", "sweep_max_deg"): 98.0}
+
+
+class HastyOperator(ScriptedOperator):
+    """Answers before the robot is looked at once."""
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        return super().ask(question, answers, lambda: None)
+
+
+class StillHand:
+    """The hand of an operator who does nothing."""
+
+    is_turning = False
+
+    def hold(self, angles_rad: Sequence[float]) -> None: ...
+
+    def turn(self, index: int, angle_rad: float) -> None: ...
+
+    def release(self) -> None: ...
+
+
+def test_an_operator_who_turns_nothing_is_asked_again_and_then_refused(tmp_path: Path) -> None:
+    operator = HastyOperator()
+    session = Session(tmp_path, operator, lambda done, total: None, simulated=True)
+    with SimulatedRobot(session, BuiltRobot(CONFIGURATION), seed=1).open(CONFIGURATION) as (test_rig, _):
+        steps = HandSteps(test_rig, operator, StillHand()).steps(["left_sweep"])
+        with pytest.raises(BenchError, match="left_sweep turned by 0 degrees|turned instead of left_sweep"):
+            conduct_steps(steps, Notebook(tmp_path, {}), operator, session.show, {})
+    assert len(operator.reported) == 2
 
 
 def test_exchanged_motors_end_the_calibration_with_what_to_do(tmp_path: Path) -> None:
