@@ -21,7 +21,7 @@ from drivers.drive_types import DEFAULT, DRIVE_TYPES
 FD_RATE_KBIT_S = 5000  # of the data, where the drives use CAN FD
 HEAD = """\
 # Configuration of one robot, written by `mudskipper init`. Every key that is left out has its default; the reference in
-# the documentation lists all. Before the first torque: measure the geometry, and let the bench find signs and zeros.
+# the documentation lists all. Before the first walk: measure the geometry, and run `mudskipper calibrate`.
 """
 
 

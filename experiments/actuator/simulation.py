@@ -24,6 +24,7 @@ from typing import NamedTuple
 from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
 from experiments.actuator.weight_handling import ManualWeights
+from experiments.bench.rig import on_bench
 from experiments.reports.value_text import miss_text
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.prompt import GO_ON
@@ -100,7 +101,7 @@ def simulated_bench(
         )[name]
         for name, drive in built.configuration.drive.items()
     }
-    lockstep = Lockstep(configuration, paper_track(), seed, recorder, plant=plant, drives=drives)
+    lockstep = Lockstep(on_bench(configuration), paper_track(), seed, recorder, plant=plant, drives=drives)
     weights = SimulatedWeights(lockstep, joint, plan, seed)
     if prompts:
         weights = PractisedWeights(lockstep, joint, plan, seed, prompts)

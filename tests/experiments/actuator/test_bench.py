@@ -10,9 +10,13 @@ import pytest
 
 from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
+from experiments.actuator.simulation import simulated_bench
 from experiments.robot.bench_errors import BenchError, RobotInUseError
+from experiments.robot.bench_robot import arm
 from experiments.study.session import Session
+from firmware_host.configuration.loading import load_configuration
 from tests.experiments.still_robot import StillRobot
+from tests.folders import EXAMPLE_CONFIGURATION
 from tests.scripted_operator import ScriptedOperator
 
 HOLD_IT = "Take off the weight and hold the flipper: torque goes off."
@@ -96,3 +100,11 @@ def test_torque_goes_off_and_the_operator_is_warned_before_a_joint_is_mounted(tm
     with pytest.raises(KeyboardInterrupt):
         bench_of(robot, operator, tmp_path).calibrate(PLAN)
     assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[1]
+
+
+def test_a_simulated_bench_arms_a_robot_that_is_not_calibrated_yet(tmp_path: Path) -> None:
+    configuration = load_configuration(EXAMPLE_CONFIGURATION)
+    robot, _ = simulated_bench(configuration, "right_adduction", PLAN, 1, tmp_path / "log.mcap")
+    arm(robot)
+    assert robot.call("status")["mode"] == "hold"
+    robot.close()
