@@ -21,6 +21,7 @@ cp mudskipper.toml good.toml
 /opt/mudskipper/venv/bin/python - <<'END'
 from pathlib import Path
 import tomlkit
+from simulation.harness.drive_presets import calibrated
 path = Path("mudskipper.toml")
 configuration = tomlkit.parse(path.read_text())
 for bus in configuration["bus"].values():
@@ -33,7 +34,7 @@ configuration["gains"] = {
     "adduction_stiffness_nm_rad": 8.0,
     "adduction_damping_nm_s_rad": 0.072,
 }
-path.write_text(tomlkit.dumps(configuration))
+path.write_text(calibrated(tomlkit.dumps(configuration)))
 END
 """
 
