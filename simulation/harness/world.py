@@ -44,6 +44,7 @@ FIXED_OF_DRIVE = frozenset(
         "torque_constant_nm_a",
         "current_limit_a",
         "model",
+        "serial_number",
         "velocity_range_rad_s",
         "torque_range_nm",
     }

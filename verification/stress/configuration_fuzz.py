@@ -16,6 +16,7 @@ from random import Random
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from drivers.drive_types import DEFAULT
+from experiments.bench.rig import on_bench
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
@@ -86,7 +87,7 @@ def problems_of_refusal(file: CandidateFile, problems: list[str]) -> Iterator[st
 
 def build(read: Configuration | World) -> Lockstep:
     if isinstance(read, Configuration):
-        return Lockstep(read, TRACK)
+        return Lockstep(on_bench(read), TRACK)  # a file without a calibration is not armed
     configuration = load_example()
     return Lockstep(configuration, read.track, plant=read.plant(configuration), drives=read.drives(configuration))
 
