@@ -25,9 +25,9 @@ class Key(NamedTuple):
 
 
 def configuration_keys(record: type = Configuration, section: str = "") -> Iterator[Key]:
-    """Yield all keys, section by section in the order of the records."""
+    """Yield all keys, section by section in the order of the records; a section's own keys before its tables."""
     hints = get_type_hints(record, include_extras=True)
-    for item in fields(record):
+    for item in sorted(fields(record), key=lambda item: _record_of(hints[item.name]) is not None):
         inner, path = _record_of(hints[item.name]), f"{section}.{item.name}".lstrip(".")
         if inner:
             wrapped = {dict: f"{path}.NAME", list: f"[{path}]"}
