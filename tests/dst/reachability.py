@@ -71,12 +71,12 @@ class Reachability:
 
     def longest_s(self, index: int, ticks: int) -> float:
         """Return how long a motor may keep its torque after the loop has taken it away."""
+        if self.is_foreign(index):
+            return float("inf")
         if self._recently(self._disturbed_s[index], WATCHDOG_S + AFTERMATH_S) or self._recently(
             self._late_s, WATCHDOG_S + AFTERMATH_S
         ):
             return WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
-        if self.is_foreign(index):
-            return float("inf")
         return ticks * self._period_s
 
     def longest_idling_s(self, index: int) -> float:

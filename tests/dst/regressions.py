@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tests.dst.scenario import Call, Failure, Scenario, Surroundings, Terminate
+from tests.dst.scenario import Call, Failure, Scenario, Surroundings, Suspend, Terminate
 
 
 class Regression(NamedTuple):
@@ -180,6 +180,21 @@ REGRESSIONS = (
                 Failure(at_s=0.168, component="right_adduction.encoder", kind="frozen", for_s=0.805),
             ),
             for_s=1.023,
+        ),
+    ),
+    Regression(
+        "the torque of another program was counted as ours after a stall of the loop",
+        Scenario(
+            seed=7310034,
+            surroundings=Surroundings(seed=0, drive_type="moteus"),
+            start="power-on",
+            events=(
+                Failure(
+                    at_s=0.143, component="left_sweep.master", kind="after every tenth command, unheard", for_s=0.039
+                ),
+                Suspend(at_s=0.143, for_s=0.006, inside="fault_monitor.update"),
+            ),
+            for_s=0.232,
         ),
     ),
 )
