@@ -44,21 +44,23 @@ def simulate(
 ) -> int:
     if local and not config:
         raise usage_error("--local belongs to --config FILE; without a file the robot is local anyway")
-    try:
-        folder = named_folder(bus)
-    except ValueError as problem:
-        raise usage_error(f"--bus {problem}") from None
-    if reset or emergency_stop:
-        number, answer = RESET if reset else EMERGENCY_STOP
-        return _signal(number, answer, config if config and not local else folder / "mudskipper.toml")
-    if world:
-        complain(*load_world(world).warnings)  # before anything is made; the peer reads it again
+    wanted = RESET if reset else EMERGENCY_STOP if emergency_stop else None
     ground = peer.Ground(waters=mud, world=world, on_blocks=on_blocks)
-    if config and not local:
+    if world and not wanted:
+        complain(*load_world(world).warnings)  # before anything is made; the peer reads it again
+    if config and not local:  # needs no folder, which a service without a home folder does not have
+        if wanted:
+            return _signal(*wanted, config)
         configuration = load_configuration(config)
         return peer.simulate(
             configuration, ground, seed, partial(_announce, config, configuration, f"--config {config}")
         )
+    try:
+        folder = named_folder(bus)
+    except ValueError as problem:
+        raise usage_error(f"--bus {problem}") from None
+    if wanted:
+        return _signal(*wanted, folder / "mudskipper.toml")
     logs = Path("logs").absolute()
     text = configuration_text(folder, logs)
     if config:

@@ -216,3 +216,14 @@ def test_a_second_terminal_finds_the_simulated_robot_where_no_service_runs(
     assert shared.default_socket() == short_folder / "mudskipper.sock"
     monkeypatch.setenv("MUDSKIPPER_SOCKET", "/given")
     assert shared.default_socket() == Path("/given")
+
+
+def test_a_robot_on_its_own_buses_needs_no_folder_of_the_user(
+    short_folder: Path, peers: list[StillPeer], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(name: str) -> Path:
+        raise OSError(f"no folder for {name}")
+
+    setup = write_local_setup(short_folder, short_folder)
+    monkeypatch.setattr("command_line.simulate.named_folder", none)
+    assert main(["simulate", "--config", str(setup)]) == exit_codes.OK and len(peers) == 1
