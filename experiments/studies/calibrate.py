@@ -7,7 +7,7 @@ notebook of the folder, which belongs to this configuration and these drives.
 from dataclasses import replace
 from getpass import getuser
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from control.records import JOINTS
 from experiments.actuator.configuration_change import find_target
@@ -16,7 +16,7 @@ from experiments.actuator.simulation import bench_configuration
 from experiments.calibration.calibration import Calibration
 from experiments.calibration.report import FILES as FILES
 from experiments.calibration.robots import CalibratedRobot, RealRobot, SimulatedRobot, build_with_errors
-from experiments.studies.actuator import INSTALLED, Lever, Weights
+from experiments.studies.actuator import INSTALLED, Lever, parse_weights
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
@@ -34,7 +34,9 @@ def study(
     operator: Annotated[str | None, Option("of the record (default: this user)")] = None,
     lever: Lever = None,
     lever_tolerance: Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")] = 1.0,
-    weights: Weights = WEIGHTS_G,
+    weights: Annotated[
+        Any, Option("in grams (default: 100,200,400)", metavar="G,G,...", parse=parse_weights)
+    ] = WEIGHTS_G,
     weight_tolerance: Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")] = 0.1,
     trials: Annotated[int, Option("passes through them", low=1, high=100)] = TRIALS,
     practise: Annotated[bool, Option("on a simulated robot whose errors are to be found; its hands obey")] = False,
