@@ -12,6 +12,7 @@ from command_line import exit_codes
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import load_configuration
+from simulation.harness.drive_presets import calibrated
 from tests.command_line.command_lines import run
 from tests.command_line.drives.bench_setup import Bench
 from tests.drivers.bench.simulated_bus import simulated
@@ -166,6 +167,6 @@ def test_firmware_0_5_is_found_and_named_as_not_settable(folder: Path, monkeypat
 def test_a_cubemars_can_neither_be_read_nor_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(folder, "mit", monkeypatch, model="AK80-9")
     text = bench.config.read_text(encoding="utf-8").replace('type = "mit"', 'type = "mit"\nmodel = "AK80-9"')
-    bench.config.write_text(text, encoding="utf-8")
+    bench.config.write_text(calibrated(text), encoding="utf-8")  # the record of another model would be refused
     ended = run("drives", "setup", "--config", str(bench.config))
     assert ended.stdout.count("neither read nor written") == 4
