@@ -74,9 +74,13 @@ class TransmitGate:
     def open(self) -> None:
         """Let torque pass, for arming; the first torque counts from zero."""
         if not self.is_open:
-            for outlet in self._outlets:
-                outlet.forget_torques()
+            self.forget_torques()
         self.is_open = True
+
+    def forget_torques(self) -> None:
+        """Let the next torques count from zero: none has left for longer than any torque takes to grow."""
+        for outlet in self._outlets:
+            outlet.forget_torques()
 
     def close(self) -> None:
         """Let only zero torque pass."""

@@ -224,6 +224,7 @@ class Loop:
         """
         if self._clock() - now_s > self.configuration.faults.silence_s:
             self.sent = self.nothing_sent
+            self.drives.gate.forget_torques()  # the next ones count from zero there too
             return
         if self.mode is Mode.ARMING:
             self.drives.arm(now_s)

@@ -197,4 +197,18 @@ REGRESSIONS = (
             for_s=0.232,
         ),
     ),
+    Regression(
+        "after a stall within a tick, in which nothing was sent, the gate refused the first torque as too large a step",
+        Scenario(
+            seed=7310363,
+            surroundings=Surroundings(seed=0),
+            start="idle",
+            events=(
+                Call(at_s=0.0, client="pilot", method="arm", params={"force": ""}),
+                Call(at_s=0.207, client="pilot", method="walk"),
+                Suspend(at_s=0.259, for_s=0.031, inside="fault_monitor.update"),
+            ),
+            for_s=0.34,
+        ),
+    ),
 )
