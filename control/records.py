@@ -163,8 +163,15 @@ class FlipperLoad(NamedTuple):
 NO_LOAD = FlipperLoad(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
 
 
+STANCES = ("unknown", "yield", "mixed", "limited_by_motor", "limited_by_body")  # what set the force of a stance
+
+
 class Estimate(NamedTuple):
-    """One coefficient with its standard error. `reason` says why it is invalid, only a lower bound, or ambiguous."""
+    """One coefficient, at the depth and the speed of its stroke, with two standard errors.
+
+    `std_error` contains everything: publish it. `repeatability` contains only what differs between the strides of one
+    session in one mud: compare strides by it. `reason` says why a value is invalid, only a lower bound, or ambiguous.
+    """
 
     value: float  # N/m³
     std_error: float  # N/m³
@@ -172,6 +179,9 @@ class Estimate(NamedTuple):
     valid: bool
     reason: str = ""
     at_least: bool = False  # the mud did not yield: the value is a lower bound
+    repeatability: float = UNKNOWN  # N/m³
+    depth_m: float = UNKNOWN  # deepest point of the stroke below the mud's surface
+    speed_m_s: float = UNKNOWN  # of the flipper in the stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,8 +208,10 @@ class StrideEstimate:
     surface_std_error_m: float = UNKNOWN
     other_surface_m: float = UNKNOWN  # where the strokes of the trial find two, as in and next to a hole; else NaN
     position_m: float = UNKNOWN  # of the body along the track when the insertion ended; NaN without a pose
-    stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
-    tare_n: float = UNKNOWN  # weight of what clings to the flipper
+    stance: str = STANCES[0]
+    yield_force_n: float = UNKNOWN  # across the plate while the mud yielded, at the depth of k_s; NaN where it did not
+    yield_force_std_error_n: float = UNKNOWN  # between strides of one session
+    tare_n: float = UNKNOWN  # weight of what clings to the flipper; an offset below zero is no weight
     tare_drift_n: float = UNKNOWN  # since the stride before
     extraction_torque_nm: float = UNKNOWN  # largest of the mud on the adduction joint during the extraction
 

@@ -28,7 +28,7 @@ from estimation.strokes.air import AirSwing
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from estimation.strokes.origin_fit import median
 from estimation.strokes.scatter_memory import ScatterMemory
-from estimation.strokes.shear import Base, Shear, find_shear, shear_samples
+from estimation.strokes.shear import Base, Shear, find_shear, shear_samples, sheared_stroke, yield_force_n
 from estimation.strokes.stroke import Batch, Stroke
 from estimation.strokes.stroke_fit import (
     NOT_THERE,
@@ -39,6 +39,7 @@ from estimation.strokes.stroke_fit import (
     fit_insertion,
     insertion_samples,
     level_free,
+    levelling_m,
 )
 from estimation.strokes.surface import Surface, find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
@@ -48,6 +49,7 @@ STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.001
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
 TWO_SURFACES = "the strokes find two surfaces"
 NO_MUD = "no evidence of mud: the torques are those of friction"
+DRAGGED = "the swing drags mud: its torque is too much of the stance's"
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
 CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 
@@ -222,7 +224,8 @@ class FlipperEstimator(StrideEstimator):
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
-            no_mud = NOT_THERE._replace(reason=NO_MUD)
+            dragged = self._air.is_dragging(self._pushed_nm(stance.batches))
+            no_mud = NOT_THERE._replace(reason=DRAGGED if dragged else NO_MUD)
             return finished(Learned(no_mud, no_mud, no_mud, self.surface_m, extraction_torque_nm=UNKNOWN))
         stride = ClosingStride(
             stance=stance,
@@ -244,6 +247,7 @@ class FlipperEstimator(StrideEstimator):
         yield
         k_e = yield from self._learn_extraction(stride)
         yield
+        force_n, force_error_n = yield_force_n(self.geometry, stance.batches, shear, stride.friction_error_nm)
         self.fits = self.fits._replace(
             k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
             k_e=partial(extraction_samples, self.geometry, extraction.moving(), surface, extraction.first_m),
@@ -257,15 +261,20 @@ class FlipperEstimator(StrideEstimator):
             surface_std_error_m=surface.std_error_m,
             other_surface_m=surface.other_m,
             stance=shear.case,
-            tare_n=stride.zero.weight_n,
+            yield_force_n=force_n,
+            yield_force_std_error_n=force_error_n,
+            tare_n=max(0.0, stride.zero.weight_n),
             tare_drift_n=stride.tare_drift_n,
         )
 
     def _met_mud(self, stance: Sequence[Batch], extraction: Sequence[Batch]) -> bool:
         """Return whether the stance or the extraction needs more torque than friction."""
-        pushed_nm = median([batch.sweep_nm + self._air.friction_nm for batch in stance]) if stance else 0.0
         pulled_nm = median([-batch.adduction_nm for batch in extraction]) if extraction else 0.0
-        return self._air.is_push(pushed_nm) or self._air.is_pull(pulled_nm)
+        return self._air.is_push(self._pushed_nm(stance)) or self._air.is_pull(pulled_nm)
+
+    def _pushed_nm(self, stance: Sequence[Batch]) -> float:
+        """Return the middle torque of a stance, friction included."""
+        return median([batch.sweep_nm + self._air.friction_nm for batch in stance]) if stance else 0.0
 
     def _learn_extraction(self, stride: ClosingStride) -> Work[Estimate]:
         stroke, surface = stride.extraction, stride.surface
@@ -280,12 +289,15 @@ class FlipperEstimator(StrideEstimator):
         """Add the errors of friction and of the surface, dk = (n + 1) k dδ / z as pressure and area grow with depth."""
         if shear.fit is None:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
-        depth_m = stride.deepest_m - stride.surface.depth_m
+        surface, depth_m = stride.surface, stride.deepest_m - stride.surface.depth_m
         power = 1.0 + growth_exponent(self.geometry, depth_m)
-        surface = power * shear.fit.slope * stride.surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
+        per_surface = power * shear.fit.slope / depth_m if depth_m > 0.0 else 0.0
         friction = stride.friction_error_nm / shear.moment_m4
-        estimate = evaluated(shear.fit, hypot(surface, friction), shear.samples)
-        return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)
+        stroke = sheared_stroke(self.geometry, stride.stance.batches, surface.depth_m, shear)
+        own, shared = hypot(per_surface * surface.own_error_m, friction), per_surface * levelling_m(surface)
+        estimate = evaluated(shear.fit, own, shared, stroke)
+        at_least = shear.at_least and estimate.valid
+        return estimate._replace(at_least=at_least, reason=estimate.reason or shear.reason)
 
 
 def _named(estimate: Estimate, surface: Surface) -> Estimate:

@@ -129,7 +129,7 @@ class JointLoads:
         if not self._is_smooth:
             sweep_nm += _friction_nm(drive.sweep_friction, sweep_rad, sweep_rad_s)
             adduction_nm += _friction_nm(drive.adduction_friction, adduction_rad, adduction_rad_s)
-        saturated = abs(sweep.current_a) >= self._clip_a or abs(adduction.current_a) >= self._clip_a
+        saturated = abs(sweep.current_a) >= self._clip_a
         return self._without_gravity(sweep_rad, adduction_rad, sweep_nm, adduction_nm, saturated)
 
     def _without_gravity(

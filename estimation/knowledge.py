@@ -207,9 +207,12 @@ def _mean(
     weight_left, weight_right = 1.0 / (variance_left + between), 1.0 / (variance_right + between)
     fraction = weight_right / (weight_left + weight_right)
     k = left.at(depth_m)[0] * exp(fraction * excess)
+    repeatability = k / sqrt(weight_left + weight_right)
+    common = (1.0 - fraction) * _common(left) + fraction * _common(right)
     return Coefficient(
         value=k,
-        std_error=k / sqrt(weight_left + weight_right),
+        std_error=sqrt(repeatability * repeatability + k * k * common),
+        repeatability=repeatability,
         depth_m=depth_m,
         exponent=left.exponent + fraction * (right.exponent - left.exponent),
         exponent_std_error=left.exponent_std_error + fraction * (right.exponent_std_error - left.exponent_std_error),
@@ -219,6 +222,12 @@ def _mean(
 
 def _log_at(coefficient: Coefficient, depth_m: float) -> tuple[float, float]:
     """Return ln k and its variance."""
-    k, std_error = coefficient.at(depth_m)
-    relative = std_error / k
+    k, error = coefficient.at(depth_m)
+    relative = error / k
     return log(k), relative * relative
+
+
+def _common(coefficient: Coefficient) -> float:
+    """Return the relative variance that all strides share."""
+    whole, own = (error / coefficient.value for error in (coefficient.std_error, coefficient.repeatability))
+    return max(0.0, whole * whole - own * own)

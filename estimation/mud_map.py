@@ -1,7 +1,7 @@
 """A map of the mud: each coefficient over pieces of 5 cm along the track, about half a step, if there is a pose.
 
 A piece's coefficient is the weighted mean of ln k over all strides of both flippers there, with the weights 1/r² of
-estimation/strokes/depth_line.py. Its standard error is that of the mean, times √(χ²/(n - 1)) if the strides differ by
+estimation/strokes/depth_line.py. Its repeatability is that of the mean, times √(χ²/(n - 1)) if the strides differ by
 more than their own errors explain (Birge's ratio: a boundary within the piece, or a hole entered a second time). The
 strides' depths differ too, so each coefficient has a mean depth. Lower bounds are not averaged: the greatest counts
 while the piece has no value. The map drops the pieces that were entered longest ago, so its memory is bounded.
@@ -24,7 +24,8 @@ class Mapped(NamedTuple):
     """One coefficient of one piece."""
 
     value: float  # N/m³
-    std_error: float  # N/m³
+    std_error: float  # N/m³, with what all strides have in common
+    repeatability: float  # N/m³, without it
     depth_m: float  # mean of the strides'
     strides: int
     at_least: bool
@@ -46,6 +47,7 @@ class Sums(NamedTuple):
     squares: float
     strides: int
     at_least: bool
+    common: float  # variance of the errors that all strides share
 
     def plus(self, reading: Reading) -> Sums:
         if reading.at_least:
@@ -62,14 +64,17 @@ class Sums(NamedTuple):
             self.squares + self.weight * fraction * stronger * stronger,
             self.strides + 1,
             False,
+            self.common + fraction * (reading.common - self.common),
         )
 
     def mapped(self) -> Mapped:
         k, strides = exp(self.log_k), self.strides
         scatter = max(1.0, self.squares / (strides - 1)) if strides > 1 else 1.0
+        variance = scatter / self.weight
         return Mapped(
             value=k,
-            std_error=k * sqrt(scatter / self.weight),
+            std_error=k * sqrt(variance + self.common),
+            repeatability=k * sqrt(variance),
             depth_m=exp(self.log_depth),
             strides=strides,
             at_least=self.at_least,
@@ -77,7 +82,7 @@ class Sums(NamedTuple):
 
 
 def _alone(reading: Reading) -> Sums:
-    return Sums(1.0 / reading.variance, reading.log_k, reading.log_depth, 0.0, 1, reading.at_least)
+    return Sums(1.0 / reading.variance, reading.log_k, reading.log_depth, 0.0, 1, reading.at_least, reading.common)
 
 
 Piece = tuple[Sums | None, Sums | None, Sums | None]  # of k_p, k_s, k_e

@@ -107,10 +107,11 @@ class PaperEstimator(StrideEstimator):
         k_p = self._penetration.estimate()
         if not isfinite(self._surface_m):
             k_p = k_p._replace(reason=f"no force above {SURFACE_FORCE_N} N in insertion")
+        depth_m = self._deepest_m - self.surface_m
         learned = Learned(
-            k_p=k_p,
-            k_s=self._shear.estimate(),
-            k_e=self._extraction.estimate(),
+            k_p=k_p._replace(depth_m=depth_m),
+            k_s=self._shear.estimate()._replace(depth_m=depth_m),
+            k_e=self._extraction.estimate()._replace(depth_m=depth_m),
             surface_m=self.surface_m,
             extraction_torque_nm=self._extraction_nm,
         )

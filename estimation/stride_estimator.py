@@ -16,7 +16,7 @@ from typing import NamedTuple
 from control.computing.bounded_work import Work, WorkQueue
 from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
-from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
+from control.records import NO_LOAD, STANCES, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads, JointMotion
 from estimation.stride_clock import StrideClock
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
@@ -34,7 +34,9 @@ class Learned(NamedTuple):
     extraction_torque_nm: float
     surface_std_error_m: float = UNKNOWN
     other_surface_m: float = UNKNOWN
-    stance: str = "unknown"
+    stance: str = STANCES[0]
+    yield_force_n: float = UNKNOWN
+    yield_force_std_error_n: float = UNKNOWN
     tare_n: float = UNKNOWN
     tare_drift_n: float = UNKNOWN
 

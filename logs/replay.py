@@ -33,9 +33,7 @@ from logs.lab.columns import PAPER_CONSTANT_NM_A
 from logs.lab.findings import Finding
 from logs.lab.lab_csv import LabLog, is_lab_csv, read_lab_csv
 
-# The standard errors of the mud's height. On the bench k_s of first strokes scatters by 3.6 to 5.2 % in fifteen trials
-# of three muds, of which torque and fit explain 4.5 %; the walking robot sinks and pitches by several millimetres.
-LEVELLED_M, UNEVEN_M = 0.0002, 0.005
+UNEVEN_M = 0.005  # standard error of the mud's height under the authors' walking robot, which sinks and pitches
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # the assumption of the authors' method; the masses of their arm are unknown
@@ -163,9 +161,14 @@ def configuration_of(path: Path, text: str) -> Configuration:
         raise LogError(f"{path}: this version does not accept its configuration: {problem.problems[0]}") from problem
 
 
-def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
+def replay_lab(
+    lab: LabLog,
+    configuration: Configuration | None = None,
+    method: Method | None = None,
+    surface_error_m: float | None = None,
+) -> Replay:
     """Replay with `lab_estimator`."""
-    estimator = lab_estimator(lab, configuration, method)
+    estimator = lab_estimator(lab, configuration, method, surface_error_m)
     found = [
         (stride, estimator.fits_of(stride.flipper))
         for _, reading in lab_readings(estimator, lab)
@@ -183,14 +186,18 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
 
 
 def lab_estimator(
-    lab: LabLog, configuration: Configuration | None = None, method: Method | None = None
+    lab: LabLog,
+    configuration: Configuration | None = None,
+    method: Method | None = None,
+    surface_error_m: float | None = None,
 ) -> MudEstimator:
     """Return an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
 
     A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
     geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE,) * len(FLIPPERS), EstimationParameters()
-    parameters = replace(parameters, surface_error_m=LEVELLED_M if len(lab.flippers) == 1 else UNEVEN_M)
+    if len(lab.flippers) > 1:
+        parameters = replace(parameters, surface_error_m=UNEVEN_M)
     if configuration:
         geometry, parameters = configuration.geometry, configuration.estimation
         own = dict(zip(configuration.rig.flippers, configuration.flipper_drives, strict=True))
@@ -198,6 +205,8 @@ def lab_estimator(
     limited = [drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives]
     fixed_base = parameters.fixed_base or len(lab.flippers) == 1
     parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
+    if surface_error_m is not None:
+        parameters = replace(parameters, surface_error_m=surface_error_m)
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
     return MudEstimator(geometry, limited, parameters, drag_n)
 

@@ -6,7 +6,7 @@ strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readabl
 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the ratio starts
 between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The larger of
 both estimates counts, since each is on the safe side. The same k_s holds the body back by its pad: there the safe side
-is a standard error more.
+is above the estimate.
 
 The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the fraction of it at the peak:
 k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the peak is less than k_e Φ
@@ -34,8 +34,8 @@ SUCTION_RATIO = 1.0  # peak extraction torque over k_p Φ, without k_e
 LEARNING = 0.25  # weight of a new stride
 FRACTIONS = (0.2, 1.5)  # bounds of the learned values
 RATIOS = (0.2, 1.5)
-# Standard errors: a slip costs half a step, a stuck flipper the walk.
-THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = 1.0, 2.0
+# Standard errors: a slip costs a part of a step and a deeper stride some time, a stuck flipper costs the walk.
+THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = 0.5, 2.0
 SAG_FRACTION = 0.25  # of the deepest sag, on average over the stance
 GRID_M = 0.0025  # resolution of depths; the joints do not follow more finely in mud
 

@@ -8,8 +8,10 @@ continues to slide against the drag f_r + b v of its rail or belly:
 
 Motors that reach their limit F_m first do not slip: the joints lag behind their targets and make up for it later, also
 in the extraction, while the mud holds the plates. So in firm mud a deeper stride is longer, although the motors push
-no harder. In the extraction F falls with the depth at which the plates still are; the energy left in the spring throws
-the body ahead until they are out. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
+no harder. Mud holds a plate at rest with less than it resists a moving one with: in the authors' logs a plate that
+stops keeps 85 to 90 % of its load. So the plates creep by all of the lag where F is F_m, by none of it where CREEP F
+is, and by a part of it between. In the extraction F falls with the depth at which the plates still are; the energy left
+in the spring throws the body ahead until they are out. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
 
 The authors' optimiser has S = 2 l min(α, √(1 - ((f_r + f_a)/2 f_s)²)) instead, with one inertial force for the whole
 stance. That balance of forces at one angle has no step at all where thrust is less than drag and inertia together,
@@ -23,10 +25,12 @@ from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
 from control.geometry import FlipperGeometry
+from control.limits import clip
 from control.parameters.gait_parameters import GaitParameters
 
 LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia is negligible
 STEP_S = 0.01  # 1 kg on 500 N/m swings in 0.28 s
+CREEP = 0.87  # of the yield force: mud withstands so much for long
 NEGLIGIBLE = 1e-6
 
 
@@ -81,10 +85,17 @@ def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
     yield_n, motor_n = traction.yield_n, traction.motor_n
     if min(yield_n, motor_n) <= dry_n:
         return 0.0
-    body_m = body_m_s = slip_m = 0.0
+    creeping = clip((motor_n / yield_n - CREEP) / (1.0 - CREEP), 0.0, 1.0)
+    body_m = body_m_s = slip_m = lag_m = 0.0
     for swept_m, fraction in motion:
         held_n = fraction * yield_n
-        force_n = min(stiffness_n_m * (swept_m - body_m - slip_m), motor_n)
+        stretch_m = swept_m - body_m - slip_m
+        behind_m = stretch_m - motor_n / stiffness_n_m  # lag of the joints, where the motors are at F_m
+        if behind_m > lag_m:
+            crept_m = creeping * (behind_m - lag_m)
+            slip_m, behind_m = slip_m + crept_m, behind_m - crept_m
+        lag_m = behind_m if behind_m > 0.0 else 0.0
+        force_n = motor_n if behind_m > 0.0 else stiffness_n_m * stretch_m
         if abs(force_n) > held_n:
             force_n = held_n if force_n > 0.0 else -held_n
             slip_m = swept_m - body_m - force_n / stiffness_n_m

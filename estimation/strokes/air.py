@@ -67,6 +67,10 @@ class AirSwing:
         """Return whether the sweep torque of a stance, friction included, needs mud to explain it."""
         return stance_nm > MUD_RATIO * (self.friction_nm + MUD_NM)
 
+    def is_dragging(self, stance_nm: float) -> bool:
+        """Return whether a stance that is no push takes more than friction: the swing's torque is then mud as well."""
+        return stance_nm > AIR_NM
+
     def is_pull(self, extraction_nm: float) -> bool:
         """Return whether the adduction torque of an extraction, without friction, needs mud that holds on."""
         return extraction_nm > AIR_NM

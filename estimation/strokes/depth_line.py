@@ -7,9 +7,9 @@ scalar updates,
     m += g (x - x̄ - m (h - h̄)) / I     I += g (h - h̄)     with g = W w (h - h̄) / (W + w) and w = 1/r²
     x̄ += w (x - x̄) / (W + w)           h̄ likewise          W += w
 
-which is weighted least squares with a prior on m. r² = (std_error/k)² + 0.08²: strides in the same mud differ by 8 %
-beyond their standard errors, as in the authors' logs. W fades once it holds eight strides, so the line follows slow
-change. Errors common to all strides (a torque constant, the plate's dimensions) are not included.
+which is weighted least squares with a prior on m. r² = (repeatability/k)² + 0.08²: strides in the same mud differ by
+8 % beyond their errors, as in the authors' logs. W fades once it holds eight strides, so the line follows slow change.
+The errors common to all strides (a torque constant, the plate's dimensions) are averaged apart, for the level alone.
 """
 
 from __future__ import annotations
@@ -42,17 +42,24 @@ class Reading(NamedTuple):
     variance: float
     log_depth: float
     at_least: bool = False
+    common: float = 0.0  # variance of the errors that all strides share
 
 
 def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
     """Return the logarithms of an estimate; None if it is invalid or outside the range of muds."""
-    k, std_error = estimate.value, estimate.std_error
+    k, error = estimate.value, estimate.repeatability
     if not ((estimate.valid or estimate.at_least) and DEPTHS_M[0] <= depth_m <= DEPTHS_M[1]):
         return None
-    if not (COEFFICIENTS_N_M3[0] <= k <= COEFFICIENTS_N_M3[1] and 0.0 <= std_error <= k):
+    if not (COEFFICIENTS_N_M3[0] <= k <= COEFFICIENTS_N_M3[1] and 0.0 <= error <= k):
         return None
-    relative = std_error / k
-    return Reading(log(k), relative * relative + REPEATABILITY * REPEATABILITY, log(depth_m), estimate.at_least)
+    relative, whole = error / k, estimate.std_error / k
+    return Reading(
+        log_k=log(k),
+        variance=relative * relative + REPEATABILITY * REPEATABILITY,
+        log_depth=log(depth_m),
+        at_least=estimate.at_least,
+        common=max(0.0, whole * whole - relative * relative),
+    )
 
 
 class Line(NamedTuple):
@@ -64,6 +71,7 @@ class Line(NamedTuple):
     exponent: float
     exponent_weight: float
     strides: int
+    common: float = 0.0
 
     def plus(self, reading: Reading | None) -> Line:
         if reading is None or reading.at_least:
@@ -81,6 +89,7 @@ class Line(NamedTuple):
             self.exponent + leverage * (stronger - self.exponent * deeper) / exponent_weight,
             min(exponent_weight, 1.0 / SURE_EXPONENT**2),
             self.strides + 1,
+            self.common + fraction * (reading.common - self.common),
         )
 
     def expected(self, log_depth: float) -> tuple[float, float]:
@@ -100,7 +109,8 @@ class Line(NamedTuple):
         k, depth_m = exp(self.log_k), exp(self.log_depth)
         return Coefficient(
             value=k,
-            std_error=k / sqrt(self.weight),
+            std_error=k * sqrt(1.0 / self.weight + self.common),
+            repeatability=k / sqrt(self.weight),
             depth_m=depth_m,
             exponent=self.exponent,
             exponent_std_error=1.0 / sqrt(self.exponent_weight),

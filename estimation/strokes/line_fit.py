@@ -39,7 +39,7 @@ class LineFit:
         k = self.b / self.s
         residual = self.q - self.b * k
         std_error = sqrt(max(0.0, residual) / (self.n - 1) / self.s) if isfinite(residual) else inf
-        return Estimate(k, std_error, self.n, *_verdict(k, std_error))
+        return Estimate(k, std_error, self.n, *_verdict(k, std_error), repeatability=std_error)
 
 
 def _verdict(k: float, std_error: float) -> tuple[bool, str]:

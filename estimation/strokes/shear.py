@@ -3,14 +3,15 @@
 The plate's pressure is k_s ζ only where the mud yields. Because the flippers can move the body, there are three cases
 (section III-C of the paper), distinguished batch by batch by the plate's slip, its path back through the mud:
 
-    yield   the body stands, the plate shears through the mud: τ₁ = k_s Ψ
-    body    the body advances and the mud does not yield: the force is the body's drag, a lower bound of k_s
-    mixed   the plate slips while the body advances: k_s from the batches that slip
+    yield             the body stands, the plate shears through the mud: τ₁ = k_s Ψ
+    limited_by_body   the body advances and the mud does not yield: the force is the body's drag, a lower bound of k_s
+    mixed             the plate slips while the body advances: k_s from the batches that slip
+    limited_by_motor  a motor at its limit for more than CLIPPED of the stance sets the force, however the plate creeps:
+                      a lower bound of k_s
 
 A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. With a fixed
 base all travel is slip. Without a pose the size of the force decides: while both flippers together push less than the
-body's drag the body cannot have moved; otherwise the largest force withstood is a lower bound. So is the force of a
-motor at its limit.
+body's drag the body cannot have moved; otherwise the largest force withstood is a lower bound.
 """
 
 from collections.abc import Sequence
@@ -23,8 +24,9 @@ from control.geometry import FlipperGeometry
 from control.plate_integrals import moment_width_m, stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
 from estimation.strokes.fit_samples import FitSamples
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
 from estimation.strokes.stroke import Batch
+from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY, FittedStroke
 from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
 
 MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
@@ -32,6 +34,8 @@ SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
 QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
+CLIPPED = 0.3  # of the samples of a stance: the mean force is then that of the motor within a few percent
+MOTOR, BODY = "limited_by_motor", "limited_by_body"
 
 
 class Base(Enum):
@@ -44,7 +48,7 @@ class Base(Enum):
 class Shear(NamedTuple):
     fit: OriginFit | None
     at_least: bool
-    case: str  # "yield", "body", "mixed", "unknown", "saturated"
+    case: str  # one of control.records.STANCES
     samples: int
     reason: str = ""
     moment_m4: float = inf  # mean Ψ of the batches that count, by which an error of the torque becomes one of k_s
@@ -58,6 +62,9 @@ def find_shear(
     moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
     if not any(moment > 0.0 for moment in moments):
         return Shear(None, False, "unknown", 0, "no depth in any batch")
+    clipped = sum([batch.samples for batch in batches if batch.saturated])
+    if clipped > CLIPPED * sum([batch.samples for batch in batches]):
+        return _bound(geometry, MOTOR, "a motor at its limit", batches, moments)
     slips = slips_m(geometry, batches, base)
     if slips is None:
         return _without_pose(geometry, batches, moments, drag_n)
@@ -65,8 +72,8 @@ def find_shear(
     if len(steady) >= MIN_BATCHES:
         return _value(_case(geometry, batches, slips), steady, batches, moments)
     if any(batch.saturated for batch in batches):
-        return _bound(geometry, "saturated", "a motor at its limit", batches, moments)
-    return _bound(geometry, "body", "the mud held: the body moved", batches, moments)
+        return _bound(geometry, MOTOR, "a motor at its limit", batches, moments)
+    return _bound(geometry, BODY, "the mud held: the body moved", batches, moments)
 
 
 def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> float:
@@ -79,6 +86,28 @@ def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: 
     fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
     moment_m4 = exact_sum(moments[i] for i in steady) / len(steady)
     return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4, steady=steady)
+
+
+def sheared_stroke(geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, shear: Shear) -> FittedStroke:
+    """Return the part of the stance that a value or a bound of k_s is made from."""
+    used = [batches[i] for i in shear.steady] or batches
+    depths_m = [geometry.depth_m(batch.sweep_rad, batch.adduction_rad) - surface_m for batch in used]
+    return FittedStroke(shear.samples, max(depths_m), median([batch.speed_m_s for batch in used]))
+
+
+def yield_force_n(
+    geometry: FlipperGeometry, batches: Sequence[Batch], shear: Shear, friction_error_nm: float
+) -> tuple[float, float]:
+    """Return the mean force across the plate while the mud yielded, and its standard error; NaN for a bound.
+
+    The mean over the depth that was reached needs no law of the depth and no surface.
+    """
+    torques_nm = [batches[i].sweep_nm for i in shear.steady]
+    fit = fit_through_origin([1.0] * len(torques_nm), torques_nm)
+    if fit is None:
+        return UNKNOWN, UNKNOWN
+    error_nm = hypot(fit.std_error, friction_error_nm, TORQUE_REPEATABILITY * fit.slope)
+    return fit.slope / geometry.flipper_length_m, error_nm / geometry.flipper_length_m
 
 
 def shear_samples(

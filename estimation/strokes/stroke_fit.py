@@ -19,7 +19,7 @@ from control.geometry import FlipperGeometry
 from control.plate_integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.fit_samples import FitSamples
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
@@ -29,6 +29,8 @@ REVERSAL_FRACTION = 0.25  # of the rise
 SHORTEST_M = 1e-9  # a shorter piece of travel is rounding
 MIN_VERTICAL_LEVER_M = 0.03  # below it an upward force hardly loads the adduction joint
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
+# of a torque constant without a calibration: makers state 8.27 over the velocity constant, which has this tolerance
+TORQUE_CONSTANT_UNCERTAINTY = 0.03
 # of the cross-coupling. The drop bounds its lever: the load's centre lies between the lower edge and the middle of the
 # wet part, 35 to 50 mm below the arm at a depth of 3 cm (10 %), and the drop itself is known to 2 mm (5 %).
 CROSS_COUPLING_UNCERTAINTY = 0.12
@@ -99,10 +101,22 @@ def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surfac
     samples = sum(batch.samples for batch in deep)
     bound, spread = most_withstood(withstood, min(HELD_BATCHES, len(withstood))) or (0.0, 0.0)
     depth_m = max([batch.travel_m for batch in deep], default=inf) - surface.depth_m
-    error = hypot(TORQUE_REPEATABILITY * bound, spread / 2.0, 1.5 * bound * surface.std_error_m / depth_m)
-    if not (bound > 0.0 and isfinite(bound + error)):
+    per_surface = 1.5 * bound / depth_m
+    own = hypot(TORQUE_REPEATABILITY * bound, spread / 2.0, per_surface * surface.own_error_m)
+    shared = hypot(TORQUE_CONSTANT_UNCERTAINTY * bound, per_surface * levelling_m(surface))
+    if not (bound > 0.0 and isfinite(bound + own + shared)):
         return NOT_THERE._replace(samples=samples)
-    return Estimate(bound, error, samples, True, NOT_OUT, at_least=True)
+    return Estimate(
+        value=bound,
+        std_error=hypot(own, shared),
+        samples=samples,
+        valid=True,
+        reason=NOT_OUT,
+        at_least=True,
+        repeatability=own,
+        depth_m=depth_m,
+        speed_m_s=median([batch.speed_m_s for batch in deep]),
+    )
 
 
 def _withstood(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
@@ -119,6 +133,7 @@ class _Pieces(NamedTuple):
     crossed_nm: list[float]  # cross-coupling, already subtracted
     depths_m: list[float]
     paths_m: list[float]
+    speeds_m_s: list[float]
     samples: int
     lever_m: float  # shortest vertical lever of the whole stroke
 
@@ -141,18 +156,18 @@ def _fit(
     deepest_m = max(pieces.depths_m)
     edge_m2 = mean_width_m(geometry, deepest_m) * geometry.plate_thickness_m
     scales_m = [depth_m / growth_exponent(geometry, depth_m) for depth_m in pieces.depths_m]
-    systematic = hypot(
-        CROSS_COUPLING_UNCERTAINTY * _slope(pieces.moments, pieces.crossed_nm),
-        _slope_per_surface(fit, pieces.moments, pieces.torques, scales_m) * surface.std_error_m,
-        1.5 * zero_error_n / (edge_m2 * deepest_m),
-    )
-    return evaluated(scatter.pooled(fit) if scatter else fit, systematic, pieces.samples)
+    per_surface = _slope_per_surface(fit, pieces.moments, pieces.torques, scales_m)
+    stroke = FittedStroke(pieces.samples, deepest_m, median(pieces.speeds_m_s))
+    own = hypot(per_surface * surface.own_error_m, 1.5 * zero_error_n / (edge_m2 * deepest_m))
+    cross_coupling_error = CROSS_COUPLING_UNCERTAINTY * _slope(pieces.moments, pieces.crossed_nm)
+    shared = hypot(per_surface * levelling_m(surface), cross_coupling_error)
+    return evaluated(scatter.pooled(fit) if scatter else fit, own, shared, stroke)
 
 
 def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
 ) -> Work[_Pieces]:
-    moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m = [], [], [], [], [], 0, inf
+    moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, samples, lever_m = [], [], [], [], [], [], 0, inf
     travelled = zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True)
     for number, (batch, path_m) in enumerate(travelled, 1):
         if number % BATCHES_PER_UNIT == 0:
@@ -169,9 +184,10 @@ def _pieces(
         crossed_nm.append(root * across_nm)
         depths_m.append(max(batch.travel_m - surface.depth_m, path_m / 2.0))
         paths_m.append(path_m)
+        speeds_m_s.append(batch.speed_m_s)
         samples += batch.samples
     yield
-    return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m)
+    return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, samples, lever_m)
 
 
 def travels_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:
@@ -202,17 +218,44 @@ def _slope_per_surface(
     return (2.0 * fit.slope * weighted - reported) / exact_sum(squares)
 
 
-def evaluated(fit: OriginFit, systematic: float, samples: int) -> Estimate:
-    """Turn a fit into an estimate with its full standard error, or with the reason why it is invalid."""
+class FittedStroke(NamedTuple):
+    """The part of a stroke that an estimate is made from."""
+
+    samples: int
+    depth_m: float
+    speed_m_s: float
+
+
+def evaluated(fit: OriginFit, own: float, shared: float, stroke: FittedStroke) -> Estimate:
+    """Turn a fit into an estimate with its two standard errors, or with the reason why it is invalid.
+
+    `own` is the error besides the scatter that differs between strokes, `shared` the one that they have in common.
+    """
     k = fit.slope
-    std_error = hypot(fit.std_error, systematic, TORQUE_REPEATABILITY * k)
+    repeatability = hypot(fit.std_error, own, TORQUE_REPEATABILITY * k)
+    std_error = hypot(repeatability, shared, TORQUE_CONSTANT_UNCERTAINTY * k)
     if not isfinite(k + std_error):
-        return Estimate(UNKNOWN, UNKNOWN, samples, False, "not finite")
+        return NOT_THERE._replace(samples=stroke.samples, reason="not finite")
+    reason = ""
     if k <= 0.0:
-        return Estimate(k, std_error, samples, False, "the force does not oppose the motion")
-    if std_error > LARGEST_UNCERTAINTY * k:
-        return Estimate(k, std_error, samples, False, "the samples do not follow the law")
-    return Estimate(k, std_error, samples, True)
+        reason = "the force does not oppose the motion"
+    elif std_error > LARGEST_UNCERTAINTY * k:
+        reason = "the samples do not follow the law"
+    return Estimate(
+        value=k,
+        std_error=std_error,
+        samples=stroke.samples,
+        valid=not reason,
+        reason=reason,
+        repeatability=repeatability,
+        depth_m=stroke.depth_m,
+        speed_m_s=stroke.speed_m_s,
+    )
+
+
+def levelling_m(surface: Surface) -> float:
+    """Return the part of a surface's error that the strokes of a set-up share."""
+    return sqrt(max(0.0, surface.std_error_m**2 - surface.own_error_m**2))
 
 
 def level_free(batches: Sequence[Batch], level_nm: float) -> list[Batch]:

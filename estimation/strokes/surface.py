@@ -43,6 +43,7 @@ class Surface(NamedTuple):
     found: bool
     law_error_m: float = 0.0  # if the force below grows otherwise than in proportion to depth
     other_m: float = UNKNOWN  # the trial's other surface, where its strokes find two (surface_memory.py)
+    own_error_m: float = 0.0  # the part of std_error_m that differs between the strokes of a set-up
 
 
 NO_SURFACE = Surface(UNKNOWN, UNKNOWN, 0.0, inf, False)

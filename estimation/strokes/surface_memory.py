@@ -12,6 +12,12 @@ scatter more than both explain, one of them is too small by Birge's ratio r, at 
                         logs the finds scatter by 3 to 4 mm, claim 0.6 to 2, and ln k_s follows them (correlation 0.92)
     on a free body      σ → r σ for δ: the body sinks, pitches, and steps into its own holes
 
+The error of s_i has two parts. On a fixed base the strokes of a set-up share its levelling, and only the find moves the
+surface from stroke to stroke: own_error_m is what of ε_i enters s_i. A free body meets another surface in each stride,
+so there all of the error is the stroke's own. It may also step into a hole that it left: a find that lies below the
+trial's highest one by more than HOLE errors of both is the mud's surface or the bottom of a hole. The surface may be
+anywhere between them with equal probability, √(1/3) of the distance from the find.
+
 The finds of a trial share the error of the law and of the delay, so their mean is no better than one of them. Three or
 more of them that lie CONTRADICTION errors off the nominal height show that the height is wrong, and replace it.
 
@@ -25,7 +31,7 @@ are twice those claimed, in 13 to 18.
 
 from collections import deque
 from collections.abc import Sequence
-from math import hypot, sqrt
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 from control.computing.exact_sum import exact_sum
@@ -38,6 +44,7 @@ CONTRADICTION = 3.0  # standard errors of the mean
 FEWEST = 3  # finds that can refute the nominal height
 FEWEST_OF_TWO = 2  # finds of either of two surfaces
 EXPLAINED = 0.85  # of χ² by two surfaces
+HOLE = 3.0  # standard errors: one find in 700 lies so far below the highest of the trial by chance
 FIVE_PERCENT = 1.645  # quantile of the normal distribution
 
 
@@ -57,14 +64,17 @@ class SurfaceMemory:
     def reset(self) -> None:
         self._finds = self._weight = self._moment = self._square = 0.0
         self._recent: deque[Find] = deque(maxlen=REMEMBERED)
+        self._highest = Find(inf, inf)
 
     def update(self, found: Surface, sample_m: float) -> Surface:
         """Return the surface of a stroke; `sample_m` is the travel between two samples of its insertion."""
         nominal_m2 = self.nominal_error_m**2
         offset_m = self._offset_m()
         if not found.found:
-            scatter_m2 = nominal_m2 if self.fixed_base else self._ratio() * nominal_m2
-            return found._replace(depth_m=offset_m, std_error_m=sqrt(scatter_m2))
+            error_m = sqrt(nominal_m2 if self.fixed_base else self._ratio() * nominal_m2)
+            return found._replace(
+                depth_m=offset_m, std_error_m=error_m, own_error_m=0.0 if self.fixed_base else error_m
+            )
         own_m2 = max(hypot(found.std_error_m, found.law_error_m, sample_m / sqrt(3.0)), SHARPEST_M) ** 2
         self._remember(found.depth_m, 1.0 / (own_m2 + nominal_m2))
         alone_m2 = max(found.std_error_m, SHARPEST_M) ** 2  # without the errors that the finds share
@@ -75,8 +85,24 @@ class SurfaceMemory:
             nominal_m2 *= self._ratio()
         fraction = nominal_m2 / (nominal_m2 + own_m2)
         depth_m = offset_m + fraction * (found.depth_m - offset_m)
-        other_m = other_surface_m(self._recent)
-        return found._replace(depth_m=depth_m, std_error_m=sqrt(fraction * own_m2), other_m=other_m)
+        error_m = sqrt(fraction * own_m2)
+        if self.fixed_base:
+            own_error_m = fraction * sqrt(own_m2)
+        else:
+            own_error_m = error_m = hypot(error_m, self._hole_m(Find(found.depth_m, 1.0 / own_m2)))
+        return found._replace(
+            depth_m=depth_m,
+            std_error_m=error_m,
+            own_error_m=own_error_m,
+            other_m=other_surface_m(self._recent),
+        )
+
+    def _hole_m(self, find: Find) -> float:
+        """Return the error of a find that may be the bottom of a hole; 0 for one that is no deeper than the others."""
+        self._highest = min(self._highest, find)
+        below_m = find.depth_m - self._highest.depth_m
+        errors_m = sqrt(1.0 / find.weight + 1.0 / self._highest.weight)
+        return below_m / sqrt(3.0) if below_m > HOLE * errors_m else 0.0
 
     def _remember(self, depth_m: float, weight: float) -> None:
         fading = 1.0 - 1.0 / REMEMBERED if self._finds >= REMEMBERED else 1.0
@@ -136,4 +162,4 @@ def largest_chi_square(freedom: int) -> float:
 
 def unknown_surface(nominal_error_m: float) -> Surface:
     """Return the surface before any insertion: at its nominal height."""
-    return NO_SURFACE._replace(depth_m=0.0, std_error_m=nominal_error_m)
+    return NO_SURFACE._replace(depth_m=0.0, std_error_m=nominal_error_m, own_error_m=nominal_error_m)

@@ -34,26 +34,37 @@ def flipper_pairs(recorded: DataFrame) -> DataFrame:
     walked = recorded[~recorded["fixed_base"].astype(bool) & has_error(recorded)]
     left, right = (walked[walked["flipper"] == name] for name in FLIPPERS)
     pairs = left.merge(right, on=["log", "t_start_s", "coefficient"], suffixes=("_left", "_right"))
-    errors = np.hypot(pairs["std_error_left"], pairs["std_error_right"])
+    errors = np.hypot(pairs["repeatability_left"], pairs["repeatability_right"])
     return pairs.assign(difference=(pairs["value_left"] - pairs["value_right"]) / errors)
 
 
 def agreements(pairs: DataFrame) -> dict[str, dict[str, Any]]:
-    """Return the median difference of both flippers over its claimed error, by coefficient and of all together."""
+    """Return the differences of both flippers over their claimed errors, by coefficient and of all together.
+
+    The root mean square and the largest show the tails that a median hides.
+    """
     sizes = {name: pairs.loc[pairs["coefficient"] == name, "difference"].abs() for name in COEFFICIENTS}
     sizes[ALL] = pairs["difference"].abs()
-    return {name: {"median": _rounded(each.median()), "n": len(each)} for name, each in sizes.items()}
+    return {
+        name: {
+            "median": _rounded(each.median()),
+            "rms": _rounded(float(np.sqrt((each**2).mean()))),
+            "largest": _rounded(each.max()),
+            "n": len(each),
+        }
+        for name, each in sizes.items()
+    }
 
 
 def contradictions(recorded: DataFrame) -> dict[str, int]:
     """Count the bounds on k_e, those with a value of the same flipper next to them, and those above such a value."""
     own = recorded[recorded["coefficient"] == "k_e"]
-    strides = own.groupby(["log", "flipper", "walk"])[["value", "std_error", "kind"]]
+    strides = own.groupby(["log", "flipper", "walk"])[["value", "repeatability", "kind"]]
     bound = own["kind"] == "bound"
     neighbouring, above = ~bound & bound, ~bound & bound
     for neighbour in (strides.shift(1), strides.shift(-1)):
         known = bound & (neighbour["kind"] == "value")
-        margin = CONTRADICTING * np.hypot(own["std_error"], neighbour["std_error"])
+        margin = CONTRADICTING * np.hypot(own["repeatability"], neighbour["repeatability"])
         neighbouring |= known
         above |= known & (own["value"] - neighbour["value"] > margin)
     return {"bounds": int(bound.sum()), "with_neighbour": int(neighbouring.sum()), "contradicting": int(above.sum())}
@@ -69,7 +80,7 @@ def disturbed_values(estimates: DataFrame) -> DataFrame:
     values = ordered[(ordered["disturbance"] == RECORDED) & (ordered["kind"] == "value")]
     found = pandas.concat([_same_strides(values, ordered, *run) for run in DISTURBED], ignore_index=True)
     other = found["value_disturbed"].where(found["kind_disturbed"] == "value")
-    errors = found["std_error"].where(has_error(found))
+    errors = found["repeatability"].where(has_error(found))
     return found.assign(
         ratio=other / found["value"].where(found["value"] != 0.0),
         moved_errors=(other - found["value"]).abs() / errors,

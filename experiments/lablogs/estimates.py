@@ -36,6 +36,10 @@ COLUMNS = {
     "coefficient": "object",
     "value": "float64",
     "std_error": "float64",
+    "repeatability": "float64",
+    "depth_m": "float64",
+    "speed_m_s": "float64",
+    "stance": "object",
     "kind": "object",  # value, bound or invalid
 }
 
@@ -57,11 +61,13 @@ class Refusal(NamedTuple):
     reason: str
 
 
-def read_log(paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS) -> EvaluatedLog | Refusal:
+def read_log(
+    paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS, surface_error_m: float | None = None
+) -> EvaluatedLog | Refusal:
     """Read one log and replay it by every method. Without mud there is nothing to disturb."""
     name = paths[0].name
     try:
-        recording = read_recording(paths, vertical)
+        recording = read_recording(paths, vertical, surface_error_m)
         in_mud = recording.has_evidence_of_mud()
         frames = [
             estimate_rows(run.estimate_strides(method), method=method, disturbance=disturbance, seed=seed)
@@ -105,6 +111,10 @@ def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame
             "coefficient": name,
             "value": estimate.value,
             "std_error": estimate.std_error,
+            "repeatability": estimate.repeatability,
+            "depth_m": estimate.depth_m,
+            "speed_m_s": estimate.speed_m_s,
+            "stance": stride.stance,
             "kind": _kind_of(estimate),
         }
         for stride in strides
@@ -134,8 +144,8 @@ def join_estimates(logs: Sequence[EvaluatedLog], groups: Sequence[str | None]) -
 
 
 def has_error(estimates: DataFrame) -> "pandas.Series[bool]":
-    """Return which rows are values with an error to compare their scatter with."""
-    errors = estimates["std_error"]
+    """Return which rows are values with a repeatability to compare their scatter with."""
+    errors = estimates["repeatability"]
     return (estimates["kind"] == "value") & np.isfinite(errors) & (errors > 0.0)
 
 

@@ -56,7 +56,7 @@ def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
         drawn = trial[trial["kind"] != "invalid"]
         x = drawn["stroke"] + 1 + DODGE * (number - (trials - 1) / 2.0)
         bounds = drawn["kind"] == "bound"  # an arrow upward
-        values, errors = drawn["value"] / PER_CM3, drawn["std_error"] / PER_CM3
+        values, errors = drawn["value"] / PER_CM3, drawn["repeatability"] / PER_CM3
         panel.errorbar(x, values, errors, lolims=bounds, linewidth=1, capsize=2, **style)
 
 
@@ -111,7 +111,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, colour: str) -> None:
     if drawn.empty:
         return
     left, right, left_error, right_error = (
-        drawn[name] / PER_CM3 for name in ("value_left", "value_right", "std_error_left", "std_error_right")
+        drawn[name] / PER_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")
     )
     panel.errorbar(left, right, right_error, left_error, fmt="o", color=colour, markersize=4, linewidth=1)
     ends = [0.8 * min(left.min(), right.min()), 1.25 * max(left.max(), right.max())]

@@ -72,13 +72,13 @@ class Recording:
         return evidence.is_mud or isnan(evidence.stance_nm)
 
 
-def recording_of_lab(lab: LabLog) -> Recording:
+def recording_of_lab(lab: LabLog, surface_error_m: float | None = None) -> Recording:
     """Return the columns of a CSV of the paper's authors."""
 
     def replay(method: Method, current_a: Floats, rows: Rows) -> list[StrideEstimate]:
         fields: dict[str, Any] = lab._replace(current_a=current_a)._asdict()
         columns: dict[str, Any] = {name: value[rows] for name, value in fields.items() if isinstance(value, np.ndarray)}
-        return replay_lab(lab._replace(**columns), method=method).strides
+        return replay_lab(lab._replace(**columns), method=method, surface_error_m=surface_error_m).strides
 
     return Recording(
         flippers=lab.flippers,
@@ -93,14 +93,17 @@ def recording_of_lab(lab: LabLog) -> Recording:
     )
 
 
-def recording_of_log(path: Path, log: Log) -> Recording:
+def recording_of_log(path: Path, log: Log, surface_error_m: float | None = None) -> Recording:
     """Return the columns of a log of this project, with the configuration that it carries. Raises LogError."""
     configuration, ticks = configuration_of(path, log.configuration_text), log.ticks
+    estimation = configuration.estimation
+    if surface_error_m is not None:
+        estimation = replace(estimation, surface_error_m=surface_error_m)
 
     def replay(method: Method, current_a: Floats, rows: Rows) -> list[StrideEstimate]:
         disturbed = ticks[rows]
         disturbed["current_a"] = current_a[rows]
-        parameters = replace(configuration.estimation, method=method)
+        parameters = replace(estimation, method=method)
         return replay_log(path, log._replace(ticks=disturbed), replace(configuration, estimation=parameters)).strides
 
     return Recording(
@@ -117,8 +120,13 @@ def recording_of_log(path: Path, log: Log) -> Recording:
     )
 
 
-def read_recording(paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS) -> Recording:
-    """Read a CSV, whose capture has `vertical` upward, or the segments of one run. Raises LogError."""
+def read_recording(
+    paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS, surface_error_m: float | None = None
+) -> Recording:
+    """Read a CSV, whose capture has `vertical` upward, or the segments of one run. Raises LogError.
+
+    `surface_error_m` is the standard error of the mud's height, where it is not the usual one.
+    """
     if paths[0].suffix == ".mcap":
-        return recording_of_log(paths[0], read_logs(paths))
-    return recording_of_lab(read_lab_csv(paths[0], vertical))
+        return recording_of_log(paths[0], read_logs(paths), surface_error_m)
+    return recording_of_lab(read_lab_csv(paths[0], vertical), surface_error_m)

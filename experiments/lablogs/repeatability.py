@@ -1,4 +1,4 @@
-"""How well trials in one mud repeat, and whether their scatter agrees with the errors that they claim.
+"""How well trials in one mud repeat, and whether their scatter agrees with the repeatability that they claim.
 
 The rows are one coefficient's estimates with their trial and stroke: the first stroke in fresh mud, then the later ones
 in its hole. A hole weakens with every stroke, so later strokes are compared after their trial's mean and the mean of
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pandas import DataFrame, Series, get_dummies
 
 from experiments.lablogs.estimates import has_error
+from experiments.reports.depth_law import fit_depth_law
 
 Floats = NDArray[np.float64]
 
@@ -59,6 +60,32 @@ def repeatability(strokes: DataFrame) -> dict[str, Any]:
     }
 
 
+def walk_scatter(strides: DataFrame) -> dict[str, Any]:
+    """Return how one coefficient scatters over the strides of walks in one mud, and how it changes with depth.
+
+    claim: median repeatability over the value. exponent: of the depth.
+    """
+    known = _with_logarithm(strides)
+    law = fit_depth_law(known)
+    deviations = scatter_about_mean(known)
+    found = {
+        "log_sd": float(known["logarithm"].std()) if len(known) > 1 else None,
+        "claim": float(known["error"].median()) if len(known) else None,
+        "chi": deviations.chi,
+        "exponent": law.exponent if law else None,
+        "exponent_std_error": law.std_error if law else None,
+    }
+    return {name: None if value is None else round(value, 4) for name, value in found.items()}
+
+
+def scatter_about_mean(known: DataFrame) -> Scatter:
+    """Compare logarithms with their weighted mean."""
+    if len(known) < 2:
+        return Scatter()
+    logarithms, errors = known["logarithm"].to_numpy(), known["error"].to_numpy()
+    return Scatter((logarithms - np.average(logarithms, weights=errors**-2.0)) / errors, len(known) - 1)
+
+
 def first_values(strokes: DataFrame) -> DataFrame:
     """Return the first stroke of each trial that has a value there."""
     return strokes[(strokes["stroke"] == 0) & (strokes["kind"] == "value")]
@@ -91,7 +118,7 @@ def scatter_between_trials(strokes: DataFrame) -> Scatter:
     first = first[has_error(first)]
     if len(first) < 2:
         return Scatter()
-    values, errors = first["value"].to_numpy(), first["std_error"].to_numpy()
+    values, errors = first["value"].to_numpy(), first["repeatability"].to_numpy()
     return Scatter((values - np.average(values, weights=errors**-2.0)) / errors, len(first) - 1)
 
 
@@ -114,7 +141,7 @@ def separation(one: "Series[float]", other: "Series[float]") -> float | None:
 def _with_logarithm(strokes: DataFrame) -> DataFrame:
     """Return the values that claim an error, with ln k and its error."""
     known = strokes[has_error(strokes) & (strokes["value"] > 0.0)]
-    return known.assign(logarithm=np.log(known["value"]), error=known["std_error"] / known["value"])
+    return known.assign(logarithm=np.log(known["value"]), error=known["repeatability"] / known["value"])
 
 
 def _fit_additive(known: DataFrame) -> Additive:

@@ -27,7 +27,8 @@ from experiments.lablogs.estimates import (
     strokes_of,
 )
 from experiments.lablogs.log_choice import group_key
-from experiments.lablogs.repeatability import first_values, repeatability, separation
+from experiments.lablogs.repeatability import first_values, repeatability, separation, walk_scatter
+from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.study.result import Table
 
@@ -36,12 +37,23 @@ DEFINITIONS = (
     "geometric mean over its later strokes. chi: scatter over claimed error, between trials (first strokes) and "
     "between strokes (later ones, without the decline that the trials have in common); 1 is expected. Only trials of "
     "one flipper on a fixed base repeat a stroke.\n\n"
-    "Left against right: median of the difference over its claimed error in the strides of walks; 0.67 is expected. "
+    "Errors are the estimates' repeatability: what differs between strides of one session.\n\n"
+    "Walks: sd of ln k and chi over all strides in one mud, whatever their depth; the exponent of depth over them, -2 "
+    "where k_s is a force that does not depend on depth.\n\n"
+    "Left against right: the difference over its claimed error in the strides of walks; a median of 0.67 and a root "
+    "mean square of 1 are expected. "
     "In air every value and every bound is wrong. Lost: values that became invalid or a bound."
 )
 Summary = dict[str, Any]
-HEADS = {"first_cv": "first CV", "later_cv": "later CV", "chi_between_trials": "chi between trials",
-            "chi_between_strokes": "chi between strokes", "with_neighbour": "with a neighbour"}  # fmt: skip
+HEADS = {
+    "log_sd": "sd of ln k",
+    "exponent_std_error": "its error",
+    "first_cv": "first CV",
+    "later_cv": "later CV",
+    "chi_between_trials": "chi between trials",
+    "chi_between_strokes": "chi between strokes",
+    "with_neighbour": "with a neighbour",
+}
 
 
 def summary_of(
@@ -78,6 +90,7 @@ def _method_summary(logs: Sequence[EvaluatedLog], estimates: DataFrame) -> Summa
             group: {name: _repeatability(own[own["coefficient"] == name]) for name in COEFFICIENTS}
             for group, own in groups.items()
         },
+        "walks": {group: _walks(own) for group, own in groups.items() if not own["fixed_base"].all()},
         "separation": _separations(groups),
         "left_right": agreements(flipper_pairs(mud)),
         "air": _stride_counts([log.name for log in logs if not log.in_mud], recorded[~in_mud]),
@@ -90,6 +103,18 @@ def _method_summary(logs: Sequence[EvaluatedLog], estimates: DataFrame) -> Summa
 def _repeatability(own: DataFrame) -> dict[str, Any]:
     """Return the counts over all strides, and the rest over trials on a fixed base."""
     return repeatability(strokes_of(own)) | count_kinds(own)
+
+
+def _walks(own: DataFrame) -> dict[str, Any]:
+    """Return the scatter of the strides of walks in one mud, and what contradicts the depth law, by coefficient."""
+    walked = own[~own["fixed_base"].astype(bool)]
+    by_name = {name: walked[walked["coefficient"] == name] for name in COEFFICIENTS}
+    return {
+        name: count_kinds(each)
+        | walk_scatter(each)
+        | {"finding": law_finding(name, fit_depth_law(each[each["kind"] == "value"]))}
+        for name, each in by_name.items()
+    }
 
 
 def _separations(groups: Mapping[str, DataFrame]) -> list[dict[str, Any]]:
@@ -139,8 +164,27 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
         for own in (summary[where],)
         for name in COEFFICIENTS
     ]
-    agreement = [{"": name, "median of |difference| / error": row["median"], "strides": row["n"]}
-                 for name, row in summary["left_right"].items()]  # fmt: skip
+    walks = [
+        {"group": group, "": name} | {key: value for key, value in row.items() if key != "finding"}
+        for group, own in summary["walks"].items()
+        for name, row in own.items()
+    ]
+    contradicted = [
+        {"group": group, "finding": row["finding"]}
+        for group, own in summary["walks"].items()
+        for row in own.values()
+        if row["finding"]
+    ]
+    agreement = [
+        {
+            "": name,
+            "median of |difference| / error": row["median"],
+            "root mean square": row["rms"],
+            "largest": row["largest"],
+            "strides": row["n"],
+        }
+        for name, row in summary["left_right"].items()
+    ]
     effects = {"all in mud": summary["sensitivity"]} | summary["sensitivity"]["groups"]
     disturbed = [
         {"group": group, "": name, "disturbance": run.replace("_", " ")} | own[run][name]
@@ -155,6 +199,8 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
     )
     tables = {
         "Repeatability": groups.drop(columns=["n_later"], errors="ignore"),
+        "Walks": DataFrame(walks),
+        "Depth law": DataFrame(contradicted),
         "Separation of first strokes, in pooled standard deviations": DataFrame(summary["separation"]),
         "Left against right": DataFrame(agreement),
         "Values and bounds": DataFrame(counts),

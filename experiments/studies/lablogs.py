@@ -48,6 +48,10 @@ def study(
     vertical: Annotated[
         CaptureAxis, Option("axis of a CSV log's motion capture that points up", metavar="AXIS")
     ] = VERTICAL_AXIS,
+    surface_error: Annotated[
+        float | None,
+        Option("standard error of the mud's height (default: 5 for walks, else 1)", low=0.1, high=50, unit="mm"),
+    ] = None,
 ) -> Result:
     """Real logs: do estimates repeat as they claim?
 
@@ -59,8 +63,10 @@ def study(
     difference over its claimed error in walks; 0.67 is right. Logs without mud must give no values and no bounds.
     Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent of the rows missing.
     """
+    surface_error_m = None if surface_error is None else surface_error / 1000.0
     logs = _logs_in(folders, [*(rule.pattern for rule in group), *air])
-    read = trials.compute([partial(read_log, paths, vertical=vertical) for paths in logs])
+    read_one = partial(read_log, vertical=vertical, surface_error_m=surface_error_m)
+    read = trials.compute([partial(read_one, paths) for paths in logs])
     refused = [each for each in read if isinstance(each, Refusal)]
     measured = [each for each in read if isinstance(each, EvaluatedLog)]
     if air:

@@ -14,6 +14,7 @@ from control.limits import LimitedTorques
 from control.modes import Mode
 from control.records import (
     FLIPPERS,
+    STANCES,
     TWO_FLIPPERS,
     UNKNOWN,
     BodyPose,
@@ -30,9 +31,13 @@ from firmware_host.ticker import Tick
 MESSAGES = "mudskipper_msgs/msg"
 
 
-def _enumeration(name: str, values: type[IntEnum]) -> Field:
-    words = tuple(value.name.lower() for value in values)
-    return Field(name, "uint8", ", ".join(f"{number} {word}" for number, word in enumerate(words)), words=words)
+def _enumeration(name: str, words: Sequence[str]) -> Field:
+    meaning = ", ".join(f"{number} {word}" for number, word in enumerate(words))
+    return Field(name, "uint8", meaning, words=tuple(words))
+
+
+def _names(values: type[IntEnum]) -> tuple[str, ...]:
+    return tuple(value.name.lower() for value in values)
 
 
 @cache
@@ -67,8 +72,8 @@ def tick_kind(rig: Rig) -> RowKind:
             Field("tick", "uint32", "ticks since the start, missed ones included"),
             Field("missed_ticks", "uint32", "since the start"),
             Field("stride", "int32", "-1 outside of a walk"),
-            _enumeration("mode", Mode),
-            _enumeration("phase", Phase),
+            _enumeration("mode", _names(Mode)),
+            _enumeration("phase", _names(Phase)),
             Field("limited", "bool", "the limits cut a torque"),
             Field("power_cut", "bool", "the motors' power is cut, as by the emergency stop"),
         ),
@@ -131,8 +136,15 @@ def rig_of(metadata: Mapping[str, str]) -> Rig:
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 COEFFICIENT_UNIT = "N/m^3"
+COEFFICIENT_PARTS = {
+    "": COEFFICIENT_UNIT,
+    "_std_error": f"{COEFFICIENT_UNIT}, with what all strides have in common",
+    "_repeatability": f"{COEFFICIENT_UNIT}, standard error between strides of one session",
+    "_depth_m": "deepest point of the stroke below the surface",
+    "_speed_m_s": "of the flipper in the stroke",
+}
 COEFFICIENT_FIELDS = tuple(
-    Field(f"{name}{part}", "float64", COEFFICIENT_UNIT) for name in COEFFICIENTS for part in ("", "_std_error")
+    Field(f"{name}{part}", "float64", meaning) for name in COEFFICIENTS for part, meaning in COEFFICIENT_PARTS.items()
 )
 
 STRIDE = RowKind(
@@ -152,6 +164,8 @@ STRIDE = RowKind(
         Field("insertion_force_n", "float64", "largest upward force"),
         Field("stance_force_n", "float64", "largest forward force"),
         Field("extraction_force_n", "float64", "most negative upward force"),
+        Field("yield_force_n", "float64", "across the plate while the mud yielded; NaN where it did not"),
+        Field("yield_force_std_error_n", "float64", "between strides of one session"),
         Field("step_m", "float64", "advance of the body; NaN without a pose"),
         Field(
             "position_m", "float64",
@@ -164,7 +178,8 @@ STRIDE = RowKind(
         Field("supply_min_v", "float64", "lowest of the flipper's drives since its stride before closed"),
         Field("index", "uint32", "number of the stride in its walk"),
         *(Field(f"{name}_samples", "uint32", "distinct ones in the fit") for name in COEFFICIENTS),
-        Field("flipper", "uint8", "0 left, 1 right", words=FLIPPERS),
+        _enumeration("flipper", FLIPPERS),
+        _enumeration("stance", STANCES),
         *(Field(f"{name}_valid", "bool", "the coefficient can be used") for name in COEFFICIENTS),
         *(Field(f"{name}_at_least", "bool", "it is a lower bound") for name in COEFFICIENTS),
         Field("released", "bool", "out of the mud without a recovery, before swing began"),
@@ -177,10 +192,10 @@ def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float, supp
     values = {field.name: getattr(stride, field.name, None) for field in STRIDE.fields}
     for name in COEFFICIENTS:
         estimate = getattr(stride, name)
-        values |= {name: estimate.value, f"{name}_std_error": estimate.std_error, f"{name}_samples": estimate.samples}
-        values |= {f"{name}_valid": estimate.valid, f"{name}_at_least": estimate.at_least}
+        parts = {f"{name}_{part}": value for part, value in estimate._asdict().items()}
+        values |= {name: estimate.value} | {key: value for key, value in parts.items() if key in values}
     values |= {"stamp_s": now_s, "chosen_depth_m": chosen_depth_m, "supply_min_v": supply_min_v}
-    values["flipper"] = FLIPPERS.index(stride.flipper)
+    values |= {"flipper": FLIPPERS.index(stride.flipper), "stance": STANCES.index(stride.stance)}
     return STRIDE.encode(*values.values())
 
 

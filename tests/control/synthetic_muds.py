@@ -29,7 +29,15 @@ def reported(
     exponent_uncertainty: float = 0.0,
 ) -> Coefficient:
     """Return a coefficient of the paper's own law (one k at every depth), unless an exponent is given."""
-    return Coefficient(value, uncertainty, depth_m, exponent, exponent_uncertainty, 8)
+    return Coefficient(
+        value=value,
+        std_error=uncertainty,
+        repeatability=uncertainty,
+        depth_m=depth_m,
+        exponent=exponent,
+        exponent_std_error=exponent_uncertainty,
+        strides=8,
+    )
 
 
 def choose_now(
@@ -44,7 +52,7 @@ def bound(value: float, depth_m: float = 0.03) -> Coefficient:
 
 
 def measured(value: float, at_least: bool = False) -> Estimate:
-    return Estimate(value, 0.01 * value, 20, True, at_least=at_least)
+    return Estimate(value, 0.01 * value, 20, True, at_least=at_least, repeatability=0.01 * value)
 
 
 def estimated(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudEstimate:

@@ -428,15 +428,17 @@ def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
 
 
 def test_the_interval_of_95_percent_covers_the_truth_about_that_often() -> None:
-    """Of 300 strides k_p covers 98 %, k_s 94 % and k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such
-    tests; intervals half or twice as wide as they should be would read 88 and 99.5 %.
+    """A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; intervals half as wide as they should be would read
+    68 %, and of intervals twice as wide the errors would fill a half.
     """
     reported = [drawn(seed) for seed in range(300)]
     for index in range(3):
         pairs = [(coefficients(stride)[index], mud[index]) for mud, stride in reported]
         assert sum(each.valid for each, _ in pairs) >= 297
         hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
-        assert 0.88 <= np.mean(hits) <= 0.998  # k_p's interval includes the error of the law, absent in this mud
+        assert np.mean(hits) >= 0.9
+        spread = np.std([(each.value / truth - 1.0) * each.value / each.std_error for each, truth in pairs])
+        assert 0.5 <= spread <= 1.1  # k_p's interval includes the error of the law, absent in this mud
 
 
 def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
@@ -477,7 +479,7 @@ def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_stren
         for row in noisy(rows_of(stuck(radians(10.0)), MUD._replace(k_s=2.0e6)), 1, 0.01)
     ]
     stride = one(rows, estimator(drive, base=base))
-    assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
+    assert (stride.stance, stride.k_s.reason) == ("limited_by_motor", "a motor at its limit")
     assert stride.k_s.at_least and stride.k_s.valid
     at_rad = radians(10.0)
     plate = submerged_plate(GEOMETRY, at_rad, GEOMETRY.adduction_rad(at_rad, 0.03))
@@ -488,13 +490,13 @@ def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_stren
 def test_a_stance_that_stops_almost_at_once_gives_not_even_a_bound() -> None:
     """However long the motor pushes, the flipper at rest makes one batch, and a bound needs three batches in a row."""
     stride = one(noisy(rows_of(stuck(radians(25.0))), 1, 0.01), estimator(WEIGHTLESS._replace(current_limit_a=1.0)))
-    assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
+    assert (stride.stance, stride.k_s.reason) == ("limited_by_motor", "a motor at its limit")
     assert not stride.k_s.valid and not stride.k_s.at_least
 
 
 def test_a_stance_that_sticks_below_the_limit_is_not_called_saturated() -> None:
     rows = rows_of(stuck(radians(10.0)))
-    assert one(rows, estimator(WEIGHTLESS._replace(current_limit_a=50.0))).stance == "body"
+    assert one(rows, estimator(WEIGHTLESS._replace(current_limit_a=50.0))).stance == "limited_by_body"
 
 
 def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
@@ -504,11 +506,11 @@ def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
     return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, paths_m, strict=True)]
 
 
-@pytest.mark.parametrize(("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
+@pytest.mark.parametrize(("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "limited_by_body")])
 def test_the_body_position_shows_whether_mud_or_body_moved(fraction: float, case: str) -> None:
     stride = one(carried(rows_of(motion()), fraction), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
     assert stride.stance == case
-    assert stride.k_s.at_least is (case == "body")
+    assert stride.k_s.at_least is (case == "limited_by_body")
     assert stride.k_s.value == pytest.approx(MUD.k_s, rel=2e-3)  # these rows carry the mud's whole strength anyway
 
 

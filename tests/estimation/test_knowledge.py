@@ -35,11 +35,11 @@ NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
 
 def reported(value: float, relative: float = 0.0) -> Estimate:
-    return Estimate(value, relative * value, 50, True)
+    return Estimate(value, relative * value, 50, True, repeatability=relative * value)
 
 
 def bound(value: float, relative: float = 0.0) -> Estimate:
-    return Estimate(value, relative * value, 50, True, "the mud held", True)
+    return Estimate(value, relative * value, 50, True, "the mud held", True, relative * value)
 
 
 def stride(
@@ -560,8 +560,8 @@ class TestDepthLaw:
 
 
 NONSENSE = [
-    Estimate(value, std_error, 50, True)
-    for value, std_error in [
+    Estimate(value, error, 50, True, repeatability=error)
+    for value, error in [
         (nan, 0.1e6),
         (1e6, nan),
         (inf, 1.0),

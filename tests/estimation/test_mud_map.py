@@ -16,7 +16,7 @@ NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
 
 def reported(value: float, relative: float = 0.0, at_least: bool = False) -> Estimate:
-    return Estimate(value, relative * value, 50, True, "", at_least)
+    return Estimate(value, relative * value, 50, True, "", at_least, relative * value)
 
 
 def stride(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.depth.forecast import DepthForecast
+from control.depth.forecast import THRUST_UNCERTAINTY, DepthForecast
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import (
@@ -56,19 +56,22 @@ class TestThrust:
         learned = estimated(reported(0.12e6, depth_m=0.025, exponent=-0.8))
         assert forecast(learned).yield_n(depth_m) == pytest.approx(2.0 * k_s * thrust_m3(depth_m), rel=PIECES)
 
-    def test_it_is_less_by_one_standard_error(self) -> None:
-        assert forecast(estimated(reported(0.3e6, 0.1e6))).yield_n(0.03) == forecast(estimated(SOFT)).yield_n(0.03)
+    def test_it_is_less_by_a_part_of_the_repeatability_and_does_not_depend_on_the_standard_error(self) -> None:
+        counted = estimated(reported(0.4e6 - THRUST_UNCERTAINTY * 0.1e6))
+        for std_error in (0.1e6, 0.3e6):
+            uncertain = estimated(reported(0.4e6, 0.1e6)._replace(std_error=std_error))
+            assert forecast(uncertain).yield_n(0.03) == pytest.approx(forecast(counted).yield_n(0.03))
 
     def test_the_error_of_the_depth_law_counts_at_other_depths(self) -> None:
         uncertain, sure = (
             forecast(estimated(reported(0.1e6, exponent_uncertainty=uncertainty))) for uncertainty in (0.3, 0.0)
         )
-        fraction = 1.0 - 0.3 * log(0.05 / 0.03)
+        fraction = 1.0 - THRUST_UNCERTAINTY * 0.3 * log(0.05 / 0.03)
         for depth_m, expected in ((0.03, 1.0), (0.05, fraction)):
             assert uncertain.yield_n(depth_m) == pytest.approx(expected * (sure.yield_n(depth_m) or nan))
 
     def test_an_error_above_the_value_gives_no_thrust(self) -> None:
-        assert forecast(estimated(reported(0.1e6, 0.2e6))).yield_n(0.03) == 0.0
+        assert forecast(estimated(reported(0.1e6, 0.1e6 / THRUST_UNCERTAINTY))).yield_n(0.03) == 0.0
 
     def test_the_mean_of_the_flippers_counts_for_each(self) -> None:
         two_muds = apart(FlipperEstimate(None, SOFT), FlipperEstimate(None, reported(0.4e6)))
@@ -91,11 +94,12 @@ class TestMudThatHeld:
     """The mud's k_s is only a lower bound; the k_p of the insertion is a value."""
 
     def test_the_insertion_gives_the_thrust_of_a_mud_that_never_yielded(self) -> None:
-        """The thrust follows from the ratio 0.55, less its uncertainty of a fifth."""
-        alone, derived = estimated(None, None, reported(0.5e6)), estimated(reported(0.8 * 0.55 * 0.5e6))
+        """The thrust follows from the ratio 0.55, less a part of its uncertainty of a fifth."""
+        ratio = (1.0 - 0.2 * THRUST_UNCERTAINTY) * 0.55
+        alone, derived = estimated(None, None, reported(0.5e6)), estimated(reported(ratio * 0.5e6))
         assert forecast(alone).yield_n(0.03) == pytest.approx(forecast(derived).yield_n(0.03))
 
-    @pytest.mark.parametrize(("least", "k_p", "counted"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.22e6)])
+    @pytest.mark.parametrize(("least", "k_p", "counted"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.2475e6)])
     def test_the_larger_of_bound_and_insertion_counts(self, least: float, k_p: float, counted: float) -> None:
         mud_estimate = estimated(bound(least), None, reported(k_p))
         assert forecast(mud_estimate).yield_n(0.03) == pytest.approx(
@@ -110,7 +114,8 @@ class TestMudThatHeld:
         assert forecast(mud_estimate).yield_n(0.03) == forecast(estimated(SOFT)).yield_n(0.03)
 
     def test_the_uncertainty_about_the_insertion_counts(self) -> None:
-        uncertain, sure = estimated(None, None, reported(0.5e6, 0.2e6)), estimated(None, None, reported(0.3e6))
+        less = 0.5e6 - THRUST_UNCERTAINTY * 0.2e6
+        uncertain, sure = estimated(None, None, reported(0.5e6, 0.2e6)), estimated(None, None, reported(less))
         assert forecast(uncertain).yield_n(0.03) == pytest.approx(forecast(sure).yield_n(0.03))
 
 
@@ -376,9 +381,9 @@ class TestSurface:
 
 
 class TestPad:
-    def test_the_mud_at_the_pad_is_the_mean_of_the_flippers_with_a_standard_error_more(self) -> None:
+    def test_the_mud_at_the_pad_is_the_mean_of_the_flippers_on_the_side_of_more_drag(self) -> None:
         two_muds = apart(FlipperEstimate(None, reported(0.2e6, 0.05e6)), FlipperEstimate(None, reported(0.4e6)))
-        assert forecast(two_muds).drag_shear(0.02) == pytest.approx((0.25e6 + 0.4e6) / 2.0)
+        assert forecast(two_muds).drag_shear(0.02) == pytest.approx((0.2e6 + THRUST_UNCERTAINTY * 0.05e6 + 0.4e6) / 2.0)
 
     def test_it_follows_the_depth_law(self) -> None:
         learned = estimated(reported(0.2e6, exponent=-1.0))

@@ -19,6 +19,7 @@ from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
 from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
+from tests.control import synthetic_muds
 from tests.control.synthetic_muds import both, choose_now
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -28,7 +29,7 @@ NOT_REPORTED = Estimate(nan, nan, 0, False, "not reported")
 
 
 def reported(value: float, at_least: bool = False) -> Coefficient:
-    return Coefficient(value, 0.05 * value, 0.03, 0.0, 0.1, 8, at_least)
+    return synthetic_muds.reported(value, 0.05 * value, exponent_uncertainty=0.1)._replace(at_least=at_least)
 
 
 def estimated(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
@@ -124,7 +125,7 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
     for fraction, comes_out in ((0.999, True), (1.001, False)):
         narrowed = replace(parameters, gait=GaitAdaptationParameters(deg, deg))
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
-        k_e = Coefficient(fraction * just, 0.05 * fraction * just, 0.02, 0.0, 0.0, 8)
+        k_e = synthetic_muds.reported(fraction * just, 0.05 * fraction * just, depth_m=0.02)
         flipper = FlipperEstimate(None, reported(2e6), k_e)
         choice = choose_now(
             adaptation,

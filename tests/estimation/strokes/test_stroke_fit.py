@@ -21,8 +21,10 @@ from estimation.strokes.stroke_fit import (
     MIN_VERTICAL_LEVER_M,
     NOT_OUT,
     NOT_THERE,
+    TORQUE_CONSTANT_UNCERTAINTY,
     TORQUE_REPEATABILITY,
     UNOBSERVABLE,
+    FittedStroke,
     _slope_per_surface,
     bound_extraction,
     evaluated,
@@ -57,6 +59,8 @@ def surface_at(depth_m: float, std_error_m: float = 0.0) -> Surface:
 
 
 NOMINAL = surface_at(0.0)
+CONSTANT = TORQUE_CONSTANT_UNCERTAINTY
+STROKE = FittedStroke(samples=7, depth_m=0.03, speed_m_s=0.1)
 
 
 def batch_at(travel_m: float, sweep_rad: float = FRONT_RAD, samples: int = SAMPLES) -> Batch:
@@ -194,9 +198,8 @@ def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
 
 
 def systematic(estimate: Estimate) -> float:
-    """Return the relative uncertainty without the part of the torque's repeatability."""
-    fraction = estimate.std_error / estimate.value
-    return float(np.sqrt(fraction * fraction - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
+    """Return the relative uncertainty without the parts of the torque's repeatability and constant."""
+    return float(np.sqrt((estimate.std_error / estimate.value) ** 2 - TORQUE_REPEATABILITY**2 - CONSTANT**2))
 
 
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
@@ -272,9 +275,19 @@ def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() 
 
 
 def test_a_fit_is_evaluated_with_its_full_error() -> None:
-    reported = evaluated(OriginFit(K, 0.03 * K), 0.04 * K, 7)
-    assert reported._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
-    assert reported.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
+    reported = evaluated(OriginFit(K, 0.03 * K), 0.04 * K, 0.05 * K, STROKE)
+    assert reported[:1] + reported[2:6] == (K, 7, True, "", False)
+    assert (reported.depth_m, reported.speed_m_s) == (0.03, 0.1)
+    assert reported.repeatability == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
+    assert reported.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY, 0.05, CONSTANT) * K)
+
+
+def test_the_levelling_of_a_set_up_is_no_scatter_of_its_strokes() -> None:
+    """The surface of a set-up has an error of 1 mm, of which 0.6 mm are the stroke's own."""
+    known, level = insertion(down()), insertion(down(), NOMINAL._replace(std_error_m=0.001, own_error_m=0.0006))
+    parts = [each.std_error**2 - each.repeatability**2 for each in (known, level)]
+    own = level.repeatability**2 - known.repeatability**2
+    assert own / (own + parts[1] - parts[0]) == pytest.approx(0.36)
 
 
 @pytest.mark.parametrize(
@@ -290,15 +303,15 @@ def test_a_fit_is_evaluated_with_its_full_error() -> None:
     ],
 )
 def test_an_invalid_estimate_has_a_reason(slope: float, std_error: float, reason: str) -> None:
-    reported = evaluated(OriginFit(slope, std_error), 0.0, 7)
+    reported = evaluated(OriginFit(slope, std_error), 0.0, 0.0, STROKE)
     assert (reported.valid, reported.at_least, reported.samples, reported.reason) == (False, False, 7, reason)
     assert isfinite(reported.value) == (reason != "not finite")
 
 
 def test_an_error_up_to_its_limit_is_valid() -> None:
-    assert evaluated(
-        OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_UNCERTAINTY**2 - TORQUE_REPEATABILITY**2)) * K, 7
-    ).valid
+    largest = K * float(np.sqrt(LARGEST_UNCERTAINTY**2 - TORQUE_REPEATABILITY**2 - CONSTANT**2))
+    assert evaluated(OriginFit(K, 0.0), 0.99 * largest, 0.0, STROKE).valid
+    assert not evaluated(OriginFit(K, 0.0), 0.0, 1.01 * largest, STROKE).valid
 
 
 @example([0.0] * 28, -5e-324, 0.0)  # a piece of travel whose half underflows to zero
@@ -335,5 +348,6 @@ def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
     reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
     assert (reported.valid, reported.at_least, reported.reason) == (True, True, NOT_OUT)
     assert reported.value == pytest.approx(K, rel=EXACT)
-    assert reported.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
+    assert reported.repeatability == pytest.approx(TORQUE_REPEATABILITY * K)
+    assert reported.std_error == pytest.approx(hypot(TORQUE_REPEATABILITY, CONSTANT) * K)
     assert reported.samples == 4 * SAMPLES

@@ -88,7 +88,9 @@ def test_finds_that_agree_replace_a_wrong_nominal_height() -> None:
 @BASES
 def test_a_stroke_without_a_find_lies_at_the_offset_of_those_before(fixed_base: bool) -> None:
     memory = SurfaceMemory(0.001, fixed_base)
-    assert memory.update(NO_SURFACE, 0.001) == Surface(0.0, 0.001, 0.0, inf, False)
+    first = memory.update(NO_SURFACE, 0.001)
+    assert (first.depth_m, first.std_error_m, first.found) == (0.0, 0.001, False)
+    assert first.own_error_m == (0.0 if fixed_base else 0.001)
     surfaces(memory, [-0.001, -0.0012, -0.0011, -0.0009, -0.001])
     later = memory.update(NO_SURFACE, 0.001)
     assert -0.0011 < later.depth_m < -0.0004
@@ -112,3 +114,34 @@ def test_a_reset_forgets_the_trial(fixed_base: bool) -> None:
     first = surfaces(memory, [-0.004, 0.003])
     memory.reset()
     assert surfaces(memory, [-0.004, 0.003]) == first
+
+
+# the two errors
+
+
+def test_the_strokes_of_a_bench_differ_by_their_finds_and_share_the_levelling() -> None:
+    """The bench's surface is off by 2 mm in all trials, and each find by 0.5 mm: own_error_m is the scatter in a trial,
+    std_error_m the distance from the truth.
+    """
+    random, own, missed = np.random.default_rng(3), [], []
+    for _ in range(300):
+        truth_m = 0.002 * random.standard_normal()
+        finds_m = truth_m + 0.0005 * random.standard_normal(4)
+        found = surfaces(SurfaceMemory(0.002, fixed_base=True), finds_m.tolist(), 0.0005)
+        own.append((found[-1].depth_m - truth_m) / found[-1].own_error_m)
+        missed.append((found[-1].depth_m - truth_m) / found[-1].std_error_m)
+        assert found[-1].own_error_m < found[-1].std_error_m
+    assert 0.7 < np.std(own) < 1.3
+    assert 0.7 < np.std(missed) < 1.3
+
+
+@BASES
+def test_a_find_far_below_the_highest_may_be_the_bottom_of_a_hole_of_a_body_that_walks(fixed_base: bool) -> None:
+    memory = SurfaceMemory(0.005, fixed_base)
+    fresh, hole = surfaces(memory, [0.0, 0.03], 0.0005)
+    assert fresh.std_error_m < 0.001
+    if fixed_base:
+        assert hole.own_error_m < 0.005
+    else:
+        assert hole.std_error_m == hole.own_error_m == pytest.approx(0.03 / sqrt(3.0), rel=0.02)
+        assert surfaces(memory, [0.0005], 0.0005)[0].std_error_m < 0.001

@@ -13,12 +13,13 @@ INVALID = Estimate(UNKNOWN, UNKNOWN, 3, False, "too few samples")
 Run = tuple[str, int]  # disturbance and seed
 
 
-def make_value(value: float, std_error: float = 0.1) -> Estimate:
-    return Estimate(value, std_error, 20, True)
+def make_value(value: float, std_error: float = 0.1, depth_m: float = 0.03) -> Estimate:
+    """Return a value whose repeatability is `std_error`, and whose whole error is twice that."""
+    return Estimate(value, 2.0 * std_error, 20, True, repeatability=std_error, depth_m=depth_m, speed_m_s=0.1)
 
 
 def make_bound(value: float, std_error: float = 0.1) -> Estimate:
-    return Estimate(value, std_error, 20, True, "the mud did not yield", True)
+    return Estimate(value, std_error, 20, True, "the mud did not yield", True, repeatability=std_error)
 
 
 def make_stride(

@@ -62,7 +62,7 @@ def test_missing_rows_are_missing_in_every_column(monkeypatch: pytest.MonkeyPatc
     assert thinned.rows.sum() == pytest.approx(0.7 * 8000, rel=0.03)
     replayed: list[LabLog] = []
 
-    def replay(log: LabLog, method: str) -> Replay:
+    def replay(log: LabLog, method: str, surface_error_m: float | None) -> Replay:
         replayed.append(log)
         return Replay([], ())
 

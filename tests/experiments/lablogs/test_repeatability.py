@@ -13,6 +13,7 @@ from experiments.lablogs.repeatability import (
     scatter_between_strokes,
     scatter_between_trials,
     separation,
+    walk_scatter,
 )
 from tests.experiments.lablogs.synthetic_trials import INVALID, k_s_strokes, make_bound, make_value
 
@@ -100,3 +101,19 @@ def test_separation_is_the_difference_in_pooled_deviations() -> None:
     assert separation(firm, soft) == pytest.approx(1.0 / pooled)
     assert separation(soft, firm) == pytest.approx(-1.0 / pooled)
     assert separation(firm, soft[:1]) is None
+
+
+@pytest.mark.parametrize("claimed", [0.05, 0.02])
+def test_strides_of_walks_scatter_about_their_mean_and_fall_with_depth_as_they_were_made(claimed: float) -> None:
+    """The strides have a constant force, k ∝ 1/z², and scatter by 5 %."""
+    random = np.random.default_rng(6)
+    depths_m = random.uniform(0.02, 0.05, 40)
+    values = (0.03 / depths_m) ** 2 * np.exp(0.05 * random.standard_normal(40))
+    strides = k_s_strokes(
+        [make_value(k, claimed * k, depth_m) for k, depth_m in zip(values.tolist(), depths_m.tolist(), strict=True)]
+    )
+    found = walk_scatter(strides)
+    assert found["exponent"] == pytest.approx(-2.0, abs=2.0 * found["exponent_std_error"])
+    assert found["claim"] == pytest.approx(claimed)
+    assert found["log_sd"] == pytest.approx(float(np.std(np.log(values), ddof=1)), abs=1e-3)
+    assert found["chi"] == pytest.approx(float(np.std(np.log(values), ddof=1)) / claimed, rel=1e-2)

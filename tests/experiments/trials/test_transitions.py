@@ -9,13 +9,14 @@ import pytest
 from pandas import DataFrame
 
 import experiments.trials.transitions
-from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
+from control.mud_estimate import FlipperEstimate, MudEstimate
 from control.records import FLIPPERS
 from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
 from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import SINGLE, Trial, configuration_of
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import Clay
+from tests.control.synthetic_muds import reported
 
 DEPTH_M = 0.03
 Row = dict[str, Any]
@@ -60,7 +61,7 @@ def mud_estimate(k_p: float | None, depth_m: float = DEPTH_M) -> MudEstimate:
     """Return the same estimate for both flippers."""
     if k_p is None:
         return MudEstimate()
-    one = FlipperEstimate(Coefficient(k_p, 0.0, depth_m, -1.0, 0.0, 1))
+    one = FlipperEstimate(reported(k_p, depth_m=depth_m, exponent=-1.0))
     return MudEstimate(left=one, right=one)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.records import (
+    STANCES,
     BodyPose,
     DriveState,
     Estimate,
@@ -91,7 +92,16 @@ def test_a_tick() -> None:
 
 def test_a_stride() -> None:
     estimates = [
-        Estimate(value=number, std_error=number + 0.5, samples=int(number), valid=number > 1, at_least=number > 2)
+        Estimate(
+            value=number,
+            std_error=number + 0.5,
+            samples=int(number),
+            valid=number > 1,
+            at_least=number > 2,
+            repeatability=number + 0.25,
+            depth_m=number + 0.125,
+            speed_m_s=number + 0.0625,
+        )
         for number in (1.0, 2.0, 3.0)
     ]
     stride = StrideEstimate(
@@ -118,6 +128,9 @@ def test_a_stride() -> None:
         tare_n=18.0,
         tare_drift_n=19.0,
         extraction_torque_nm=20.0,
+        stance="mixed",
+        yield_force_n=24.0,
+        yield_force_std_error_n=25.0,
     )
     values = STRIDE.decode(stride_row(21.0, stride, 22.0, 23.0))
     assert {name: values.pop(name) for name in ("stamp_s", "chosen_depth_m", "supply_min_v", "flipper")} == {
@@ -127,6 +140,8 @@ def test_a_stride() -> None:
         "flipper": 1,
     }
     for name, estimate in zip(("k_p", "k_s", "k_e"), estimates, strict=True):
-        fields = (name, f"{name}_std_error", f"{name}_samples", f"{name}_valid", f"{name}_at_least")
-        assert tuple(values.pop(field) for field in fields) == (*estimate[:4], estimate.at_least)
+        own = estimate._asdict()
+        assert values.pop(name) == own.pop("value") and own.pop("reason") == ""
+        assert {part: values.pop(f"{name}_{part}") for part in own} == own
+    assert values.pop("stance") == STANCES.index("mixed")
     assert values == {name: getattr(stride, name) for name in values}

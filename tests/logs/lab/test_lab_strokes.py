@@ -52,7 +52,7 @@ def test_a_saturated_motor_is_reported_and_gives_a_lower_bound() -> None:
     assert stride.k_s.valid
     assert stride.k_s.at_least
     assert "limit" in stride.k_s.reason
-    assert stride.stance == "saturated"
+    assert stride.stance == "limited_by_motor"
 
 
 def test_the_stiffest_mud_supports_the_largest_forces() -> None:
