@@ -43,7 +43,8 @@ def _coefficient(history: History, flipper: str, name: str) -> Row:
         style = BOUND if estimate["at_least"] else ""
         bound = "≥ " if estimate["at_least"] else ""
         text = bound + value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    errors = [reading["std_error"] or 0.0 for reading in readings if reading["valid"]]
+        text += f" at {100.0 * estimate['depth_m']:.1f} cm"
+    errors = [reading["repeatability"] or 0.0 for reading in readings if reading["valid"]]
     last = Text(bars(values, 2.0 * SIGNIFICANT * max(errors, default=0.0))[0], "cyan")
     return [right(text, style), Text(trend(readings), "bold", justify="center"), last]
 
@@ -55,7 +56,7 @@ def trend(readings: Sequence[Report]) -> str:
         return " "
     before, last = valid[-2:]
     change = last["value"] - before["value"]
-    error = (last["std_error"] or 0.0) + (before["std_error"] or 0.0)
+    error = (last["repeatability"] or 0.0) + (before["repeatability"] or 0.0)
     if abs(change) <= SIGNIFICANT * error:
         return "→"
     return "↗" if change > 0.0 else "↘"

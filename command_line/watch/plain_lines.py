@@ -36,7 +36,8 @@ def plain_line(history: History, now_s: float) -> str:
 def _coefficient(report: dict[str, Any], name: str) -> str:
     estimate = report["mud"][name]
     bound = "≥ " if estimate["at_least"] else ""
-    return f"{name} {bound}{value_text(estimate['value'], estimate['std_error'], per=N_CM3)}"
+    value = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
+    return f"{name} {bound}{value} at {100.0 * estimate['depth_m']:.1f} cm"
 
 
 def _alarm(causes: list[dict[str, Any]]) -> str:

@@ -29,8 +29,7 @@ REVERSAL_FRACTION = 0.25  # of the rise
 SHORTEST_M = 1e-9  # a shorter piece of travel is rounding
 MIN_VERTICAL_LEVER_M = 0.03  # below it an upward force hardly loads the adduction joint
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
-# of a torque constant without a calibration: makers state 8.27 over the velocity constant, which has this tolerance
-TORQUE_CONSTANT_UNCERTAINTY = 0.03
+TORQUE_CONSTANT_UNCERTAINTY = 0.032  # of a motor without a calibration: as the simulator's motors differ
 # of the cross-coupling. The drop bounds its lever: the load's centre lies between the lower edge and the middle of the
 # wet part, 35 to 50 mm below the arm at a depth of 3 cm (10 %), and the drop itself is known to 2 mm (5 %).
 CROSS_COUPLING_UNCERTAINTY = 0.12

@@ -17,14 +17,14 @@ from typing import Any
 from pandas import Categorical, DataFrame
 
 from estimation.strokes.origin_fit import student_factor
-from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
+from estimation.strokes.stroke_fit import TORQUE_CONSTANT_UNCERTAINTY
 from experiments.reports.error_table import COEFFICIENTS, Row, error_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 
 PER_CM3 = 1.0 / N_CM3
 EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: value, std_error, valid, at_least, ...
-NUMBERS = ["value", "std_error", "truth"]  # N/m³
+NUMBERS = ["value", "std_error", "repeatability", "truth"]  # N/m³
 COLUMNS = ["mud", "method", "trial", "t_start_s", "t_end_s", "plates_m", "coefficient", "kind", "valid", "at_least",
            "reason", *NUMBERS]  # fmt: skip
 
@@ -116,11 +116,19 @@ def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[flo
     known = [error for each in values if (error := each["std_error"]) is not None and isfinite(error)]
     if spread is None or not values:
         return (known[0] if known else None), None, None
-    estimated = fmean(error**2 for error in known) if known else 0.0
     trials_error = student_factor(len(values) - 1) * spread / sqrt(len(values))
-    alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in values)
-    shared_error = max(sqrt(max(0.0, estimated - spread**2)), alike)
+    alike = TORQUE_CONSTANT_UNCERTAINTY * fmean(each["value"] for each in values)
+    shared_error = max(sqrt(_shared_variance(values, known, spread)), alike)
     return hypot(trials_error, shared_error), trials_error, shared_error
+
+
+def _shared_variance(values: Sequence[EstimateReport], known: Sequence[float], spread: float) -> float:
+    """Return what the trials' errors have in common; of logs without repeatability, what their scatter leaves."""
+    own = [error for each in values if (error := each.get("repeatability")) is not None and isfinite(error)]
+    if not known:
+        return 0.0
+    own_variance = fmean(error**2 for error in own) if len(own) == len(known) else spread**2
+    return max(0.0, fmean(error**2 for error in known) - own_variance)
 
 
 def error_table(rows: DataFrame, setup: str) -> list[Row]:

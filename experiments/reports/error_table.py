@@ -1,8 +1,10 @@
 """Errors of estimated coefficients against their true values, by setup, mud, coefficient and method.
 
 The error of an estimate is |estimate / truth - 1|, and its 95 % interval reaches 1.96 standard errors to either side.
-A lower bound has no error: bounds are counted apart, with the fraction of them that are right. A second table compares
-the plate as the flipper carries it, leaning, with the upright plate of the paper's load cell.
+A lower bound has no error: bounds are counted apart, with the fraction of them that are right. `chi` compares the
+scatter of the strides of one trial and flipper about their own mean with the repeatability that they claim: 1 is right,
+and more is a claim that is too small. A second table compares the plate as the flipper carries it, leaning, with the
+upright plate of the paper's load cell.
 """
 
 from typing import Any
@@ -19,11 +21,18 @@ Row = dict[str, Any]
 
 
 def evaluation_of(
-    setup: str, mud: str, coefficient: str, method: str, estimate: Estimate, truth: float, upright: float
+    setup: str,
+    mud: str,
+    coefficient: str,
+    method: str,
+    estimate: Estimate,
+    truth: float,
+    upright: float,
+    trial: str = "",
 ) -> Row:
     """Return one coefficient of one stride by one method, with its true value in N/m³.
 
-    `upright` is the reading of the paper's load cell; NaN where it is unknown.
+    `upright` is the reading of the paper's load cell; NaN where it is unknown. `trial` names what strides share.
     """
     return {
         "setup": setup,
@@ -32,6 +41,8 @@ def evaluation_of(
         "method": method,
         "value": estimate.value,
         "std_error": estimate.std_error,
+        "repeatability": estimate.repeatability,
+        "trial": trial,
         "kind": ("bound" if estimate.at_least else "value") if estimate.valid else "not valid",
         "truth": truth,
         "upright": upright,
@@ -55,6 +66,7 @@ def _errors(group: DataFrame) -> Row:
         "p95": _statistic(lambda errors: np.percentile(errors, 95.0), abs(ratios - 1.0)),
         "bias": _statistic(lambda each: np.median(each) - 1.0, ratios),  # median of estimate / truth - 1
         "coverage": _statistic(np.mean, abs(values["value"] - values["truth"]) <= margins),  # of the 95 % intervals
+        "chi": _scatter_over_claim(values),
         "strides": len(values),
         "bounds": len(bounds),
         "bounds_hold": _statistic(np.mean, bounds_hold),  # fraction of bounds below the truth, within their errors
@@ -62,6 +74,17 @@ def _errors(group: DataFrame) -> Row:
         "not_valid": len(group) - len(values) - len(bounds),
         "truth_n_m3": round(float(np.median(group["truth"]))),
     }
+
+
+def _scatter_over_claim(values: DataFrame) -> float | None:
+    """Return √(χ² / degrees of freedom) of the strides about the mean of their trial, in claimed repeatability."""
+    known = values[values["repeatability"] > 0.0]
+    errors = known["repeatability"] / known["value"]
+    deviations, weights = np.log(known["value"] / known["truth"]), errors**-2.0
+    sums = DataFrame({"trial": known["trial"], "weight": weights, "product": weights * deviations})
+    means = sums.groupby("trial")["product"].transform("sum") / sums.groupby("trial")["weight"].transform("sum")
+    freedom = len(known) - known["trial"].nunique()
+    return round(float(np.sqrt(np.sum(weights * (deviations - means) ** 2) / freedom)), 3) if freedom > 0 else None
 
 
 def _statistic(function: Any, values: Any) -> float | None:

@@ -286,9 +286,17 @@ def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
         text = f"≥ {text}" if estimate["at_least"] else text
         row = rows.setdefault((each["walk"], each["index"]), {"walk": each["walk"], "stride": each["index"]})
         row[f"{flipper} (N/cm³)"] = text if estimate["valid"] or text == "-" else f"({text})"
+        row[f"{flipper}: at"] = stroke_text(estimate)
         row[f"{flipper}: R²"] = f"{samples.r_squared:.3f}" if samples else "-"
         row[f"{flipper}: residual (N·cm)"] = f"{N_CM * samples.rms_residual_nm:.2f}" if samples else "-"
     return list(rows.values())
+
+
+def stroke_text(estimate: Mapping[str, Any]) -> str:
+    """Return the depth and the speed of the stroke that an estimate is from; a dash where the log has none."""
+    depth_m, speed_m_s = estimate["depth_m"], estimate["speed_m_s"]
+    speed = "" if speed_m_s is None else f", {speed_m_s:.2g} m/s"
+    return "-" if depth_m is None else f"{depth_m / CM:.1f} cm{speed}"
 
 
 # several runs

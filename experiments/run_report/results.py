@@ -25,6 +25,7 @@ from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
+from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
@@ -98,6 +99,7 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
         "shallowest_m": min(depths_m),
         "deepest_m": max(depths_m),
         "both": _gathered(estimates),
+        "findings": _law_findings(estimates),
         "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
     }
 
@@ -123,6 +125,20 @@ def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
     return {name: gather_coefficient(own["estimate"]) for name, own in by_name.items()}
 
 
+def _law_findings(estimates: DataFrame) -> list[str]:
+    """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, tell nothing."""
+    values = DataFrame(
+        [
+            {"coefficient": name} | estimate
+            for name, estimate in estimates[["coefficient", "estimate"]].itertuples(index=False)
+            if estimate["valid"] and not estimate["at_least"]
+        ],
+        columns=["coefficient", "value", "repeatability", "depth_m"],
+    ).astype({"value": float, "repeatability": float, "depth_m": float})
+    findings = [law_finding(name, fit_depth_law(values[values["coefficient"] == name])) for name in COEFFICIENTS]
+    return [finding for finding in findings if finding]
+
+
 def headline_sentences(run: Run, headline: Entry) -> list[str]:
     """Return the result in sentences; a CSV of the authors knows no faults."""
     strides, outcomes = headline["strides"], headline["outcomes"]
@@ -133,7 +149,7 @@ def headline_sentences(run: Run, headline: Entry) -> list[str]:
         stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
         warnings = f"; {counted(headline['warnings'], 'warning')}" * bool(headline["warnings"])
         sentences.append(f"{stops}{warnings}.")
-    return sentences
+    return sentences + [f"{mud['mud']}: {finding}" for mud in headline["muds"] for finding in mud["findings"]]
 
 
 def end_sentences(runs: Sequence[Run]) -> list[str]:

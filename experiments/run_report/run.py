@@ -37,6 +37,7 @@ from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
 STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces", "supply_v")
+PARTS = ("std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate, besides its value
 ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", "estimate", "samples")
 
 
@@ -194,10 +195,9 @@ def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudR
 
 def estimate_of_row(row: Stride, name: str) -> dict[str, Any]:
     """Return one coefficient of a row as the daemon reports an estimate."""
-    value, std_error = (float(row[key]) for key in (name, f"{name}_std_error"))
-    return {
-        "value": value if isfinite(value) else None,
-        "std_error": std_error if isfinite(std_error) else None,
+    numbers = {"value": float(row[name])} | {part: float(row.get(f"{name}_{part}", nan)) for part in PARTS}
+    value = numbers["value"]
+    return {key: number if isfinite(number) else None for key, number in numbers.items()} | {
         "valid": bool(row[f"{name}_valid"]) and isfinite(value),
         "at_least": bool(row[f"{name}_at_least"]),
         "reason": "",

@@ -207,19 +207,21 @@ def run_part(
     }
     if len(clays) > 1:
         return {"evaluated": [], "transitions": transitions_of(trial, truths)}
-    evaluated = [_evaluate_method(method, clays[0].name, trial, truths) for method in methods_of(own)]
+    evaluated = [_evaluate_method(method, clays[0].name, trial, truths, seed) for method in methods_of(own)]
     return {"evaluated": list(chain.from_iterable(evaluated)), "transitions": []}
 
 
 def _evaluate_method(
-    method: Method, mud: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]
+    method: Method, mud: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], seed: int
 ) -> Iterator[Row]:
     for stride, _ in replay_trial(trial, method.parameters, method.with_pose):
         truth = truths.get((stride.flipper, stride.index))
         for name in COEFFICIENTS if truth else ():
             estimate, leaning, upright = (getattr(each, name) for each in (stride, *(truth or ())))
             if isfinite(leaning):
-                yield evaluation_of(method.setup, mud, name, method.name, estimate, leaning, upright)
+                yield evaluation_of(
+                    method.setup, mud, name, method.name, estimate, leaning, upright, f"{seed} {stride.flipper}"
+                )
 
 
 # tables and figure
@@ -245,6 +247,7 @@ ERROR_COLUMNS: Columns = {
     "p95": ("p95", _percent),
     "bias": ("bias", _percent),
     "in 95 %": ("coverage", _percent),
+    "chi": ("chi", number),
     "strides": ("strides", str),
     "bounds": ("bounds", str),
     "hold": ("bounds_hold", _percent),

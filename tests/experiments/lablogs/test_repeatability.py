@@ -109,9 +109,8 @@ def test_strides_of_walks_scatter_about_their_mean_and_fall_with_depth_as_they_w
     random = np.random.default_rng(6)
     depths_m = random.uniform(0.02, 0.05, 40)
     values = (0.03 / depths_m) ** 2 * np.exp(0.05 * random.standard_normal(40))
-    strides = k_s_strokes(
-        [make_value(k, claimed * k, depth_m) for k, depth_m in zip(values.tolist(), depths_m.tolist(), strict=True)]
-    )
+    pairs = zip(values.tolist(), depths_m.tolist(), strict=True)
+    strides = k_s_strokes([[make_value(k, claimed * k, depth_m) for k, depth_m in pairs]])
     found = walk_scatter(strides)
     assert found["exponent"] == pytest.approx(-2.0, abs=2.0 * found["exponent_std_error"])
     assert found["claim"] == pytest.approx(claimed)

@@ -3,6 +3,7 @@
 from math import nan
 from typing import Any
 
+import numpy as np
 import pytest
 from pandas import DataFrame
 
@@ -119,3 +120,16 @@ def test_the_plates_are_medians_of_the_default_with_a_pose() -> None:
     row = only(plate_rows([*reported, *others]))
     assert (row["setup"], row["mud"], row["coefficient"]) == ("walking", "49.5", "k_p")
     assert (row["upright_over_leaning"], row["estimate_over_upright"]) == (0.8, 1.3)
+
+
+@pytest.mark.parametrize("claimed", [0.05, 0.02])
+def test_the_scatter_of_a_trials_strides_is_compared_with_the_claim_and_its_bias_is_not(claimed: float) -> None:
+    """Each of 30 trials has a bias of its own of 20 %, and its five strides scatter by 5 %."""
+    random = np.random.default_rng(8)
+    rows = []
+    for trial in range(30):
+        level = 1e6 * np.exp(0.2 * random.standard_normal())
+        for value in (level * np.exp(0.05 * random.standard_normal(5))).tolist():
+            estimate = Estimate(value, 0.2 * value, 10, True, repeatability=claimed * value)
+            rows.append(evaluation_of("single", "50", "k_s", "default", estimate, 1e6, 1e6, str(trial)))
+    assert only(error_rows(rows))["chi"] == pytest.approx(0.05 / claimed, rel=0.15)
