@@ -63,7 +63,7 @@ def _wall_times(rows: NDArray[np.void], offset_ns: int) -> NDArray[np.datetime64
 
 
 def _columns_of(field: Field, values: NDArray[Any]) -> list[Column]:
-    unit = COEFFICIENT_UNIT if field.meaning == COEFFICIENT_UNIT else unit_of(field.name, Meaning(""))
+    unit = COEFFICIENT_UNIT if field.meaning.partition(",")[0] == COEFFICIENT_UNIT else unit_of(field.name, Meaning(""))
     if values.ndim == 1:
         return [Column(field.name, unit, field.meaning, values, dict(enumerate(field.words)))]
     each = field.each or tuple(map(str, range(values.shape[1])))

@@ -124,4 +124,4 @@ def test_a_lower_bound_is_marked_and_an_unknown_value_is_a_dash(history: History
 
 @pytest.mark.parametrize(("values", "arrow"), [((1.0,), " "), ((1.0, 1.3), "→"), ((1.0, 1.5), "↗"), ((1.5, 1.0), "↘")])
 def test_the_arrow_shows_a_change_beyond_the_errors(values: tuple[float, ...], arrow: str) -> None:
-    assert trend([{"valid": True, "value": value, "std_error": 0.1} for value in values]) == arrow
+    assert trend([{"valid": True, "value": value, "repeatability": 0.1} for value in values]) == arrow
