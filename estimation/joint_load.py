@@ -52,7 +52,7 @@ class JointLoad(NamedTuple):
     rise_adduction_m: float
     sweep_nm: float
     adduction_nm: float
-    saturated: bool  # a motor is at its limit: the mud may withstand more
+    saturated: bool  # the sweep motor is at its limit: the mud may withstand more
 
 
 JointMotion = tuple[float, float, float, float]  # of one joint at one moment: rad, rad/s, rad/s², A
