@@ -54,6 +54,7 @@ HEADS = {
     "chi_between_strokes": "chi between strokes",
     "with_neighbour": "with a neighbour",
 }
+AGREEMENT = {"median": "median of |difference| / error", "rms": "root mean square", "n": "strides"}
 
 
 def summary_of(
@@ -155,36 +156,14 @@ def tables_of(summary: Summary) -> list[Table]:
 
 
 def _method_tables(method: str, summary: Summary) -> list[Table]:
-    groups = DataFrame(
-        [{"group": group, "": name} | row for group, own in summary["groups"].items() for name, row in own.items()]
-    )
+    walks = DataFrame(_rows_by_group(summary["walks"]), columns=None if summary["walks"] else ["group", "finding"])
     counts = [
         {"": f"in {where}", "logs": len(own["logs"]), "strides": own["strides"], "coefficient": name} | own[name]
         for where in ("mud", "air")
         for own in (summary[where],)
         for name in COEFFICIENTS
     ]
-    walks = [
-        {"group": group, "": name} | {key: value for key, value in row.items() if key != "finding"}
-        for group, own in summary["walks"].items()
-        for name, row in own.items()
-    ]
-    contradicted = [
-        {"group": group, "finding": row["finding"]}
-        for group, own in summary["walks"].items()
-        for row in own.values()
-        if row["finding"]
-    ]
-    agreement = [
-        {
-            "": name,
-            "median of |difference| / error": row["median"],
-            "root mean square": row["rms"],
-            "largest": row["largest"],
-            "strides": row["n"],
-        }
-        for name, row in summary["left_right"].items()
-    ]
+    agreement = [{"": name} | row for name, row in summary["left_right"].items()]
     effects = {"all in mud": summary["sensitivity"]} | summary["sensitivity"]["groups"]
     disturbed = [
         {"group": group, "": name, "disturbance": run.replace("_", " ")} | own[run][name]
@@ -198,11 +177,11 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
         f"by more than {MOVED:g} claimed errors with {100.0 * MISSING_ROWS:g} % of the rows missing"
     )
     tables = {
-        "Repeatability": groups.drop(columns=["n_later"], errors="ignore"),
-        "Walks": DataFrame(walks),
-        "Depth law": DataFrame(contradicted),
+        "Repeatability": DataFrame(_rows_by_group(summary["groups"])).drop(columns=["n_later"], errors="ignore"),
+        "Walks": walks.drop(columns="finding"),
+        "Depth law": walks.loc[walks["finding"] != "", ["group", "finding"]],
         "Separation of first strokes, in pooled standard deviations": DataFrame(summary["separation"]),
-        "Left against right": DataFrame(agreement),
+        "Left against right": DataFrame(agreement).rename(columns=AGREEMENT),
         "Values and bounds": DataFrame(counts),
         disturbed_title: DataFrame(disturbed),
         "Bounds on k_e that contradict a neighbouring stride": DataFrame([summary["contradictions"]["k_e"]]),
@@ -213,3 +192,7 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
         for title, rows in tables.items()
         if len(rows)
     ]
+
+
+def _rows_by_group(groups: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    return [{"group": group, "": name, **row} for group, own in groups.items() for name, row in own.items()]
