@@ -35,7 +35,7 @@ from typing import NamedTuple
 
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS, StrideEstimate
-from estimation.strokes.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, reading_of
+from estimation.strokes.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, common_variance, reading_of
 
 CHANGE = 2.6  # standard deviations beyond which a stride is no chance
 PAIR_CHANGE = 2.8  # of two strides: a second test as frequent as the first must not add as many false alarms
@@ -208,7 +208,7 @@ def _mean(
     fraction = weight_right / (weight_left + weight_right)
     k = left.at(depth_m)[0] * exp(fraction * excess)
     repeatability = k / sqrt(weight_left + weight_right)
-    common = (1.0 - fraction) * _common(left) + fraction * _common(right)
+    common = (1.0 - fraction) * common_variance(left) + fraction * common_variance(right)
     return Coefficient(
         value=k,
         std_error=sqrt(repeatability * repeatability + k * k * common),
@@ -225,9 +225,3 @@ def _log_at(coefficient: Coefficient, depth_m: float) -> tuple[float, float]:
     k, error = coefficient.at(depth_m)
     relative = error / k
     return log(k), relative * relative
-
-
-def _common(coefficient: Coefficient) -> float:
-    """Return the relative variance that all strides share."""
-    whole, own = (error / coefficient.value for error in (coefficient.std_error, coefficient.repeatability))
-    return max(0.0, whole * whole - own * own)

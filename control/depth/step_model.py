@@ -90,12 +90,12 @@ def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
     for swept_m, fraction in motion:
         held_n = fraction * yield_n
         stretch_m = swept_m - body_m - slip_m
-        behind_m = stretch_m - motor_n / stiffness_n_m  # lag of the joints, where the motors are at F_m
-        if behind_m > lag_m:
-            crept_m = creeping * (behind_m - lag_m)
-            slip_m, behind_m = slip_m + crept_m, behind_m - crept_m
-        lag_m = behind_m if behind_m > 0.0 else 0.0
-        force_n = motor_n if behind_m > 0.0 else stiffness_n_m * stretch_m
+        excess_m = stretch_m - motor_n / stiffness_n_m  # lag of the joints, where the motors are at F_m
+        if excess_m > lag_m:
+            crept_m = creeping * (excess_m - lag_m)
+            slip_m, excess_m = slip_m + crept_m, excess_m - crept_m
+        lag_m = excess_m if excess_m > 0.0 else 0.0
+        force_n = motor_n if excess_m > 0.0 else stiffness_n_m * stretch_m
         if abs(force_n) > held_n:
             force_n = held_n if force_n > 0.0 else -held_n
             slip_m = swept_m - body_m - force_n / stiffness_n_m

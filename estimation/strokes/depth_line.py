@@ -52,14 +52,20 @@ def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
         return None
     if not (COEFFICIENTS_N_M3[0] <= k <= COEFFICIENTS_N_M3[1] and 0.0 <= error <= k):
         return None
-    relative, whole = error / k, estimate.std_error / k
+    relative = error / k
     return Reading(
         log_k=log(k),
         variance=relative * relative + REPEATABILITY * REPEATABILITY,
         log_depth=log(depth_m),
         at_least=estimate.at_least,
-        common=max(0.0, whole * whole - relative * relative),
+        common=common_variance(estimate),
     )
+
+
+def common_variance(estimate: Estimate | Coefficient) -> float:
+    """Return the relative variance of the errors that all strides share."""
+    whole, own = estimate.std_error / estimate.value, estimate.repeatability / estimate.value
+    return max(0.0, whole * whole - own * own)
 
 
 class Line(NamedTuple):

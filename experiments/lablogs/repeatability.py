@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pandas import DataFrame, Series, get_dummies
 
 from experiments.lablogs.estimates import has_error
-from experiments.reports.depth_law import fit_depth_law
+from experiments.reports.depth_law import fit_depth_law, law_finding
 
 Floats = NDArray[np.float64]
 
@@ -60,10 +60,10 @@ def repeatability(strokes: DataFrame) -> dict[str, Any]:
     }
 
 
-def walk_scatter(strides: DataFrame) -> dict[str, Any]:
+def walk_scatter(coefficient: str, strides: DataFrame) -> dict[str, Any]:
     """Return how one coefficient scatters over the strides of walks in one mud, and how it changes with depth.
 
-    claim: median repeatability over the value. exponent: of the depth.
+    claim: median repeatability over the value. exponent: of the depth. finding: what contradicts the depth law of mud.
     """
     known = _with_logarithm(strides)
     law = fit_depth_law(known)
@@ -75,7 +75,8 @@ def walk_scatter(strides: DataFrame) -> dict[str, Any]:
         "exponent": law.exponent if law else None,
         "exponent_std_error": law.std_error if law else None,
     }
-    return {name: None if value is None else round(value, 4) for name, value in found.items()}
+    rounded = {name: None if value is None else round(value, 4) for name, value in found.items()}
+    return rounded | {"finding": law_finding(coefficient, law)}
 
 
 def scatter_about_mean(known: DataFrame) -> Scatter:

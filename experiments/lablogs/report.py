@@ -28,7 +28,6 @@ from experiments.lablogs.estimates import (
 )
 from experiments.lablogs.log_choice import group_key
 from experiments.lablogs.repeatability import first_values, repeatability, separation, walk_scatter
-from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.study.result import Table
 
@@ -110,12 +109,7 @@ def _walks(own: DataFrame) -> dict[str, Any]:
     """Return the scatter of the strides of walks in one mud, and what contradicts the depth law, by coefficient."""
     walked = own[~own["fixed_base"].astype(bool)]
     by_name = {name: walked[walked["coefficient"] == name] for name in COEFFICIENTS}
-    return {
-        name: count_kinds(each)
-        | walk_scatter(each)
-        | {"finding": law_finding(name, fit_depth_law(each[each["kind"] == "value"]))}
-        for name, each in by_name.items()
-    }
+    return {name: count_kinds(each) | walk_scatter(name, each) for name, each in by_name.items()}
 
 
 def _separations(groups: Mapping[str, DataFrame]) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ class DepthLaw(NamedTuple):
 
 
 def fit_depth_law(strides: DataFrame) -> DepthLaw | None:
-    """Fit the exponent to the rows with `value`, `repeatability` and `depth_m`; None where they cannot tell it."""
+    """Fit the exponent to the rows with `value`, `repeatability` and `depth_m`; None where they do not determine it."""
     known = strides[(strides["value"] > 0.0) & (strides["depth_m"] > 0.0) & (strides["repeatability"] > 0.0)]
     depths_m = known["depth_m"].to_numpy(float)
     if len(known) < FEWEST or depths_m.max() < NARROWEST * depths_m.min():

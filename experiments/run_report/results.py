@@ -126,7 +126,7 @@ def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
 
 
 def _law_findings(estimates: DataFrame) -> list[str]:
-    """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, tell nothing."""
+    """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, do not."""
     values = DataFrame(
         [
             {"coefficient": name} | estimate

@@ -111,7 +111,7 @@ def test_strides_of_walks_scatter_about_their_mean_and_fall_with_depth_as_they_w
     values = (0.03 / depths_m) ** 2 * np.exp(0.05 * random.standard_normal(40))
     pairs = zip(values.tolist(), depths_m.tolist(), strict=True)
     strides = k_s_strokes([[make_value(k, claimed * k, depth_m) for k, depth_m in pairs]])
-    found = walk_scatter(strides)
+    found = walk_scatter("k_s", strides)
     assert found["exponent"] == pytest.approx(-2.0, abs=2.0 * found["exponent_std_error"])
     assert found["claim"] == pytest.approx(claimed)
     assert found["log_sd"] == pytest.approx(float(np.std(np.log(values), ddof=1)), abs=1e-3)
