@@ -7,8 +7,7 @@ first stride of a trial counts, because the resistance of the same hole falls by
 
 import tomllib
 
-import numpy as np
-from numpy.typing import NDArray
+from pandas import DataFrame
 
 from control.records import Phase
 from experiments.flipper.base_check import INVALID_M, load_remarks, pose_remarks, surface_remarks
@@ -17,7 +16,7 @@ from experiments.robot.bench_robot import arm, rest, walk
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
-from experiments.trials.stride_profile import Floats, StrideProfile, profile_of, profile_row, thinned
+from experiments.trials.stride_profile import profile_lists, profile_of, stroke_of, thinned
 from firmware_host.configuration.configuration import Configuration
 
 METHODS = (DEFAULT, PAPER)
@@ -61,10 +60,10 @@ def measure(bench: Bench, flipper: str, depth_m: float, number: int, trial: Plan
         "mud": trial.group,
         "trial": trial.number,
         "strides": strides,
-        "truths": bench.bed.truths(flipper),
+        "truths": bench.truths(flipper),
         "from_s": walked.from_s,
         "to_s": after["now_s"],
-        "course": profile_row(thinned(profile)),
+        "course": profile_lists(thinned(profile)),
         "remarks": load_remarks(log, robot.configuration, flipper) + surface_remarks(own[0]),
     }
     for invalid in pose_remarks(before_m, after["body_x_m"], INVALID_M):
@@ -73,19 +72,11 @@ def measure(bench: Bench, flipper: str, depth_m: float, number: int, trial: Plan
     return entry
 
 
-def require_mud(profile: StrideProfile) -> None:
-    """Raises InvalidTrialError where neither insertion nor stance met a force."""
-    insertion_n = _late_mean_n(profile.force_z_n, profile.during(Phase.INSERTION))
-    stance_n = _late_mean_n(profile.force_x_n, profile.during(Phase.STANCE))
-    if max(insertion_n, stance_n) < LEAST_N:
+def require_mud(profile: DataFrame) -> None:
+    """Raises InvalidTrialError where neither insertion nor stance met a force over the last third of the stroke."""
+    forces_n = stroke_of(profile, Phase.INSERTION)["force_z_n"], stroke_of(profile, Phase.STANCE)["force_x_n"]
+    if not any(force_n.iloc[2 * len(force_n) // 3 :].mean() >= LEAST_N for force_n in forces_n):  # NaN is no force
         raise InvalidTrialError(
             "the flipper met no mud: check that it hangs over the mud, and measure the height of its axes "
             "(geometry.axis_height_m)"
         )
-
-
-def _late_mean_n(force_n: Floats, rows: NDArray[np.bool_]) -> float:
-    """Average over the last third of a stroke."""
-    late = force_n[rows][2 * int(rows.sum()) // 3 :]
-    late = late[np.isfinite(late)]
-    return float(late.mean()) if len(late) else 0.0

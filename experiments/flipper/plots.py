@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
-from experiments.flipper.modelled_force import laws_of
+from experiments.flipper.modelled_force import modelled_stride
 from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
@@ -25,7 +25,7 @@ from experiments.reports.mud_styles import (
     waters_of,
 )
 from experiments.study.notebook import Entry
-from experiments.trials.stride_profile import StrideProfile, profile_from_row
+from experiments.trials.stride_profile import profile_from, stroke_of
 
 Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
@@ -41,26 +41,24 @@ STRIDE_PANELS: tuple[tuple[str, dict[str, Any]], ...] = (  # label and legend
 
 def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
-    profile, surface_m, laws = laws_of(trial, geometry, method)
-    upward_n = np.where(profile.during(Phase.STANCE), np.nan, profile.force_z_n)
-    inserting_n, extracting_n = (
-        np.where(profile.during(phase), laws.force_z_n, np.nan) for phase in (Phase.INSERTION, Phase.EXTRACTION)
-    )
+    stride = modelled_stride(trial, geometry, method)
+    by_phase = {phase: stride.where(stride["phase"] == phase) for phase in PHASE_NAMES}
     figure = Figure(figsize=(7.0, 8.2))
     panels = figure.subplots(4, 1, sharex=True)
     for number, values, colour, label, style in (
-        (0, 100.0 * profile.depth_command_m, GREY, "$z_c$ commanded", DASHED),
-        (0, 100.0 * profile.depth_m, INK, "$z$ actual", THIN),
-        (1, np.degrees(profile.sweep_rad), "tab:blue", "sweep $\\alpha$", THIN),
-        (1, np.degrees(profile.adduction_rad), "tab:red", "adduction $\\beta$", DASHED),
-        (2, upward_n, "tab:green", "$f_z$ measured", THIN),
-        (2, inserting_n, "tab:red", "by $k_p$", MODELLED),
-        (2, extracting_n, "navy", "by $k_e$", MODELLED),
-        (3, profile.force_x_n, "tab:blue", "$f_x$ measured", THIN),
-        (3, laws.force_x_n, "tab:red", "by $k_s$", MODELLED),
+        (0, 100.0 * stride["depth_command_m"], GREY, "$z_c$ commanded", DASHED),
+        (0, 100.0 * stride["depth_m"], INK, "$z$ actual", THIN),
+        (1, np.degrees(stride["sweep_rad"]), "tab:blue", "sweep $\\alpha$", THIN),
+        (1, np.degrees(stride["adduction_rad"]), "tab:red", "adduction $\\beta$", DASHED),
+        (2, stride["force_z_n"].mask(stride["phase"] == Phase.STANCE), "tab:green", "$f_z$ measured", THIN),
+        (2, by_phase[Phase.INSERTION]["law_z_n"], "tab:red", "by $k_p$", MODELLED),
+        (2, by_phase[Phase.EXTRACTION]["law_z_n"], "navy", "by $k_e$", MODELLED),
+        (3, stride["force_x_n"], "tab:blue", "$f_x$ measured", THIN),
+        (3, stride["law_x_n"], "tab:red", "by $k_s$", MODELLED),
     ):
-        panels[number].plot(profile.time_s, values, color=colour, label=label, **style)
-    panels[0].axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
+        panels[number].plot(stride["time_s"], values, color=colour, label=label, **style)
+    surface_cm = 100.0 * (trial["strides"][method][0]["surface_m"] or 0.0)
+    panels[0].axhline(surface_cm, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
     panels[0].invert_yaxis()
     for panel in panels[2:]:
         panel.axhline(0.0, color=GREY, linewidth=0.6)
@@ -69,21 +67,16 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
         panel.legend(fontsize="small", **legend)
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
         panel.margins(x=0.0)
-    _mark_phases(panels, profile)
+    for phase, name in PHASE_NAMES.items():
+        times_s = by_phase[phase]["time_s"].dropna()
+        if len(times_s):
+            for panel in panels:
+                panel.axvspan(times_s.min(), times_s.max(), color=PHASE_SHADES[phase], linewidth=0.0, zorder=0)
+            panels[0].annotate(name, (times_s.mean(), 1.02), xycoords=("data", "axes fraction"), ha="center",
+                               va="bottom", fontsize="small")  # fmt: skip
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     return figure
-
-
-def _mark_phases(panels: Sequence[Axes], profile: StrideProfile) -> None:
-    """Shade the strokes in every panel, and name them above the first."""
-    for phase, colour in PHASE_SHADES.items():
-        times_s = profile.time_s[profile.during(phase)]
-        if len(times_s):
-            for panel in panels:
-                panel.axvspan(float(times_s[0]), float(times_s[-1]), color=colour, linewidth=0.0, zorder=0)
-            panels[0].annotate(PHASE_NAMES[phase], (float(times_s.mean()), 1.02), xycoords=("data", "axes fraction"),
-                               ha="center", va="bottom", fontsize="small")  # fmt: skip
 
 
 # figure 5
@@ -111,19 +104,15 @@ def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry]) -> Figure:
 def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw f_z against depth in insertion, f_x against sweep in stance, and f_z against depth in extraction."""
     for mud, trial in firsts.items():
-        profile = profile_from_row(trial["course"])
-        depth_cm, sweep_deg = 100.0 * profile.depth_m, np.degrees(profile.sweep_rad)
-        for panel, (phase, name), x, y in zip(
-            panels,
-            PHASE_NAMES.items(),
-            (depth_cm, sweep_deg, depth_cm),
-            (profile.force_z_n, profile.force_x_n, profile.force_z_n),
-            strict=True,
-        ):
-            during, force = profile.during(phase), "$f_x$" if phase is Phase.STANCE else "$f_z$"
-            panel.plot(x[during], y[during], label=mud_text(mud), **line_of(looks[mud]))
-            panel.set_xlabel("sweep $\\alpha$ (°)" if phase is Phase.STANCE else "depth $z$ (cm)")
-            panel.set_ylabel(f"{force} in {name} (N)")
+        profile = profile_from(trial)
+        for panel, (phase, name) in zip(panels, PHASE_NAMES.items(), strict=True):
+            stroke = stroke_of(profile, phase)
+            x, y = 100.0 * stroke["depth_m"], stroke["force_z_n"]
+            panel.set(xlabel="depth $z$ (cm)", ylabel=f"$f_z$ in {name} (N)")
+            if phase is Phase.STANCE:
+                x, y = np.degrees(stroke["sweep_rad"]), stroke["force_x_n"]
+                panel.set(xlabel="sweep $\\alpha$ (°)", ylabel=f"$f_x$ in {name} (N)")
+            panel.plot(x, y, label=mud_text(mud), **line_of(looks[mud]))
     for panel in panels:
         panel.axhline(0.0, color=GREY, linewidth=0.6)
     for panel in panels[1:]:

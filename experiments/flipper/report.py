@@ -11,7 +11,7 @@ from typing import Any
 from pandas import DataFrame
 
 from control.records import Phase
-from experiments.flipper.modelled_force import laws_of, misfit_n
+from experiments.flipper.modelled_force import misfit_n, modelled_stride
 from experiments.flipper.plots import draw_coefficients, draw_stride
 from experiments.reports.coefficient_table import compared_frame, compared_rows, error_table, mud_summaries
 from experiments.reports.error_table import COEFFICIENTS
@@ -29,6 +29,7 @@ from experiments.trials.coefficient_page import (
     truth_settings,
 )
 from experiments.trials.estimation_methods import configured_method
+from experiments.trials.stride_profile import stroke_of
 from experiments.trials.truth_file import TruthOfMud, truth_in
 from firmware_host.configuration.configuration import Configuration
 
@@ -50,6 +51,11 @@ MODELLED = (
 MODELLED_PAPER = (
     "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients and the paper's laws."
 )
+CAPTION = (
+    "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
+    "deviation over the trials; each grey dash is a trial."
+)
+COMPARED = " G to I: against the load cell, with two standard errors; on the grey line both are equal."
 Report = dict[str, Any]  # the summary, as it is in JSON
 Trials = dict[str, list[Entry]]  # by mud
 
@@ -62,14 +68,46 @@ def trials_by_mud(muds: Sequence[str], entries: Mapping[str, Entry]) -> Trials:
     return {mud: own for mud, own in by_mud.items() if own}
 
 
-def report_of(
+def result_of(
     settings: Mapping[str, Any],
     by_mud: Trials,
     configuration: Configuration,
     truth: TruthOfMud | None,
     left_out: Mapping[str, Entry],
-) -> Report:
+    logs: Sequence[Path] = (),
+) -> Result:
     """Report the trials that count. `truth` is another experiment's; without it the bed's own load cell is used."""
+    report = _report_of(by_mud, configuration, truth, left_out) | truth_settings(settings, configuration, truth, by_mud)
+    method, firsts = report["settings"]["method"], {mud: trials[0] for mud, trials in by_mud.items()}
+    compared = any(mud["truth"] for mud in report["muds"])
+    coefficients = partial(draw_coefficients, report["muds"], firsts)
+    figures = [Figure("figure5", CAPTION + COMPARED * compared, coefficients, MUDS)]
+    for mud, trial in firsts.items():
+        draw, caption = (
+            partial(draw_stride, trial, configuration.geometry, method),
+            f"Figure 4 of the paper, mud {mud_text(mud)}.",
+        )
+        figures.append(Figure(f"figure4_{file_name(mud)}", caption, draw, STRIDES))
+    texts = {
+        MUDS: _explanation(report),
+        COMPARISON: TRUTHS[report["settings"]["truth"]] if report["errors"] else "",
+        FORCES: FORCES_TEXT,
+        STRIDES: MODELLED_PAPER if method == "paper" else MODELLED,
+    }
+    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
+    return Result(
+        tables=[*coefficient_tables(report, MUDS), _force_table(report)],
+        figures=figures,
+        summary=report,
+        title="A single flipper through muds",
+        texts=texts | remark_texts(remarks, left_out),
+        logs=logs,
+    )
+
+
+def _report_of(
+    by_mud: Trials, configuration: Configuration, truth: TruthOfMud | None, left_out: Mapping[str, Entry]
+) -> Report:
     method, geometry = configured_method(configuration.estimation), configuration.geometry
     rows = compared_frame(  # the first stride of each trial
         row
@@ -93,7 +131,7 @@ def report_of(
         "later_strokes": _later_strokes([each["strides"][method] for trials in by_mud.values() for each in trials]),
         "plate_m": {"width": plate.width_m, "height": plate.height_m, "thickness": geometry.plate_thickness_m},
         "left_out": left_out,
-    } | truth_settings(settings, method, truth, by_mud)
+    }
 
 
 def _falls_with_water(muds: Sequence[Mapping[str, Any]], name: str) -> bool | None:
@@ -111,10 +149,10 @@ def _largest_forces_n(trials: Sequence[Entry], method: str) -> dict[str, float]:
 
 def _misfits_n(trial: Entry, configuration: Configuration, method: str) -> dict[str, float | None]:
     """Return the root mean square difference between the measured forces of one stride and the laws, by stroke."""
-    profile, _, laws = laws_of(trial, configuration.geometry, method)
-    rows = {name: profile.during(STROKES[name]) for name in ("insertion", "extraction")}
-    upward = {name: misfit_n(profile.force_z_n[each], laws.force_z_n[each]) for name, each in rows.items()}
-    return upward | {"stance": misfit_n(profile.force_x_n, laws.force_x_n)}
+    stride = modelled_stride(trial, configuration.geometry, method)
+    strokes = {name: stroke_of(stride, STROKES[name]) for name in ("insertion", "extraction")}
+    upward = {name: misfit_n(rows["force_z_n"], rows["law_z_n"]) for name, rows in strokes.items()}
+    return upward | {"stance": misfit_n(stride["force_x_n"], stride["law_x_n"])}
 
 
 def _later_strokes(trials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[str, list[float]]:
@@ -131,38 +169,6 @@ def _later_strokes(trials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[str, l
 
 
 # the page
-
-
-def result_of(report: Report, by_mud: Trials, configuration: Configuration, logs: Sequence[Path]) -> Result:
-    """Return the tables, figures and explanations of all trials."""
-    method, geometry = report["settings"]["method"], configuration.geometry
-    caption = (
-        "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
-        "deviation over the trials; each grey dash is a trial."
-    )
-    if any(mud["truth"] for mud in report["muds"]):
-        caption += " G to I: against the load cell, with two standard errors; on the grey line both are equal."
-    firsts = {mud: trials[0] for mud, trials in by_mud.items()}
-    strides = [
-        Figure(f"figure4_{file_name(mud)}", f"Figure 4 of the paper, mud {mud_text(mud)}.",
-               partial(draw_stride, trial, geometry, method), STRIDES)
-        for mud, trial in firsts.items()
-    ]  # fmt: skip
-    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
-    return Result(
-        tables=[*coefficient_tables(report, MUDS), _force_table(report)],
-        figures=[Figure("figure5", caption, partial(draw_coefficients, report["muds"], firsts), MUDS), *strides],
-        summary=report,
-        title="A single flipper through muds",
-        texts={
-            MUDS: _explanation(report),
-            COMPARISON: TRUTHS[report["settings"]["truth"]] if report["errors"] else "",
-            FORCES: FORCES_TEXT,
-            STRIDES: MODELLED_PAPER if method == "paper" else MODELLED,
-        }
-        | remark_texts(remarks, report["left_out"]),
-        logs=logs,
-    )
 
 
 def _explanation(report: Report) -> str:

@@ -32,7 +32,7 @@ from experiments.reports.value_text import N_CM3, miss_text, repeatability_text,
 from experiments.study.notebook import Notebook
 from experiments.study.result import Figure, Result, Table, to_json
 from experiments.study.session import Show
-from experiments.trials.load_cell_truth import OTHER_PLATE, TrueCoefficients
+from experiments.trials.load_cell_truth import OTHER_PLATE, Truth
 
 TITLE = "Ground truth of mud from a load cell"
 ACCURACY = "docs/explanation/bench_accuracy.md"
@@ -97,7 +97,7 @@ def make_result(
     plan: TrialPlan,
     cell: Mapping[str, Any],
     flipper: Mapping[str, Any],
-    truths: Mapping[str, TrueCoefficients],
+    truths: Mapping[str, Truth],
 ) -> Result:
     """Return the tables and figures. `truths` are those of simulated muds; `flipper` is a summary, or empty."""
     muds, compared = results.muds, compare_muds(flipper, results.muds)
@@ -175,10 +175,10 @@ def _comparison_row(row: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _truth_table(muds: Muds, truths: Mapping[str, TrueCoefficients]) -> Table:
+def _truth_table(muds: Muds, truths: Mapping[str, Truth]) -> Table:
     rows = []
     for mud, coefficients in muds.items():
-        true = truths[mud]._asdict()
+        true = truths[mud]
         rows.append({"mud": mud_text(mud)} | {name: value_text(true[name], per=N_CM3) for name in COEFFICIENTS})
         rows[-1] |= {f"{name} error": miss_text(coefficients[name].value, true[name]) for name in COEFFICIENTS}
     return Table("truth", TRUTH, UNITS, DataFrame(rows), "The simulated muds themselves")

@@ -13,7 +13,7 @@ from drivers.load_cell.line_formats import GRAVITY_M_S2
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.strokes import INSERTION, SHEAR, StageSettings
 from experiments.study.prompt import GO_ON, REDO, SKIP
-from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
+from experiments.trials.load_cell_truth import Truth, true_coefficients
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell_bench import RELAXATION, EmulatedBench, clay_plate
@@ -131,7 +131,7 @@ def water_of(mud: str) -> float:
     return water_percent
 
 
-def clay_truth(mud: str, settings: StageSettings) -> TrueCoefficients:
+def clay_truth(mud: str, settings: StageSettings) -> Truth:
     """Return what the plate feels in even motion, without the stage's ramps and the cell's noise."""
     depth_m = settings.depth_m
     stroke = StrokeTruth(0.0, 0.0, depth_m, settings.speed_m_s, UNKNOWN, depth_m)

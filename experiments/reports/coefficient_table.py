@@ -24,26 +24,31 @@ from experiments.reports.value_text import N_CM3, fraction_text, repeatability_t
 
 PER_CM3 = 1.0 / N_CM3
 EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: value, std_error, valid, at_least, ...
-NUMBERS = ["value", "std_error", "repeatability", "truth"]  # N/m³
-COLUMNS = ["mud", "method", "trial", "t_start_s", "t_end_s", "plates_m", "coefficient", "kind", "valid", "at_least",
-           "reason", *NUMBERS]  # fmt: skip
+NUMBERS = ["value", "std_error", "repeatability", "truth", "upright"]  # N/m³
+COLUMNS = ["setup", "mud", "method", "trial", "t_start_s", "t_end_s", "plates_m", "coefficient", "kind", "valid",
+           "at_least", "reason", *NUMBERS]  # fmt: skip
 
 
-def compared_rows(stride: Mapping[str, Any], truth: Mapping[str, float | None], **keys: Any) -> list[Row]:
+def compared_rows(
+    stride: Mapping[str, Any], truth: Mapping[str, float | None], upright: Mapping[str, float | None] = {}, **keys: Any
+) -> list[Row]:
     """Return the coefficients that a method reports of one stride, with a load cell's readings.
 
-    The mud is empty where it is not certain.
+    The mud is empty where it is not certain. `upright` has the readings with the paper's plate.
     """
-    times = {name: stride.get(name) for name in ("t_start_s", "t_end_s")}
+    keys |= {name: stride.get(name) for name in ("t_start_s", "t_end_s")}
     return [
-        keys | times | dict(estimate) | {"coefficient": name, "kind": _kind_of(estimate), "truth": truth.get(name)}
+        keys
+        | dict(estimate)
+        | {
+            "coefficient": name,
+            "kind": ("bound" if estimate["at_least"] else "value") if estimate["valid"] else "not valid",
+            "truth": truth.get(name),
+            "upright": upright.get(name),
+        }
         for name in COEFFICIENTS
         if (estimate := stride[name]) is not None
     ]
-
-
-def _kind_of(estimate: EstimateReport) -> str:
-    return ("bound" if estimate["at_least"] else "value") if estimate["valid"] else "not valid"
 
 
 def compared_frame(rows: Iterable[Row]) -> DataFrame:

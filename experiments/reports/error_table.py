@@ -12,45 +12,17 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from control.records import Estimate
-
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 NORMAL_95 = 1.96
 KEYS = ["setup", "mud", "coefficient", "method"]
 Row = dict[str, Any]
 
 
-def evaluation_of(
-    setup: str,
-    mud: str,
-    coefficient: str,
-    method: str,
-    estimate: Estimate,
-    truth: float,
-    upright: float,
-    trial: str = "",
-) -> Row:
-    """Return one coefficient of one stride by one method, with its true value in N/m³.
-
-    `upright` is the reading of the paper's load cell; NaN where it is unknown. `trial` names what strides share.
-    """
-    return {
-        "setup": setup,
-        "mud": mud,
-        "coefficient": coefficient,
-        "method": method,
-        "value": estimate.value,
-        "std_error": estimate.std_error,
-        "repeatability": estimate.repeatability,
-        "trial": trial,
-        "kind": ("bound" if estimate.at_least else "value") if estimate.valid else "not valid",
-        "truth": truth,
-        "upright": upright,
-    }
-
-
 def error_rows(evaluations: DataFrame) -> list[Row]:
-    """Return one row for each setup, mud, coefficient and method, in the order of their first evaluations."""
+    """Return one row for each setup, mud, coefficient and method, in the order of their first evaluations.
+
+    An evaluation has these keys, an estimate with its `kind`, its `truth`, and the `trial` that strides share.
+    """
     groups = evaluations.groupby(KEYS, sort=False) if len(evaluations) else ()
     return [dict(zip(KEYS, key, strict=True)) | _errors(group) for key, group in groups]
 

@@ -9,16 +9,16 @@ samples.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
-from itertools import chain
-from math import isfinite
-from typing import Annotated, Any, Literal, NamedTuple
+from itertools import chain, product
+from typing import Annotated, Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
 from estimation.estimation_parameters import EstimationParameters
-from experiments.reports.error_table import COEFFICIENTS, error_rows, evaluation_of, plate_rows
+from experiments.reports.coefficient_table import compared_frame, compared_rows
+from experiments.reports.error_table import COEFFICIENTS, error_rows, plate_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.text_tables import number
 from experiments.study.option import Option, OptionError
@@ -26,7 +26,7 @@ from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
 from experiments.trials.latency import LATENCY_S
-from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
+from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import (
     MEASURING_WALK,
@@ -34,10 +34,10 @@ from experiments.trials.trial import (
     TORQUE_ERROR,
     WALKING,
     Setup,
-    Trial,
     replay_trial,
     run_trial,
 )
+from firmware_host.operator.reports import stride_report
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
 from simulation.mud.track import Track
@@ -65,7 +65,7 @@ FIELD_OF_LAYER = {
     "saturation": "current_limit_a",
 }
 LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
-COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
+COLOURS = {DEFAULT: "tab:blue", PAPER: "tab:red", COMPENSATED: "tab:orange"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
 Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # by head: the key in a row, and how its value is shown
@@ -119,7 +119,7 @@ def study(
         for name, waters in WATERS.items()
     }
     measured = trials.run(run_part, parts_of(muds, seeds, layers))
-    evaluated = DataFrame(list(chain.from_iterable(measured["evaluated"])))
+    evaluated = compared_frame(chain.from_iterable(measured["evaluated"]))
     errors, plates = error_rows(evaluated), plate_rows(evaluated)
     boundaries = transition_rows(DataFrame(list(chain.from_iterable(measured["transitions"]))))
     settings = settings_of(muds, seeds, layers)
@@ -170,20 +170,16 @@ def disturbances_of(layers: Sequence[str]) -> Disturbances:
     return replace(NONE, **{field: getattr(LAB, field) for layer, field in FIELD_OF_LAYER.items() if layer in layers})
 
 
-class Method(NamedTuple):
-    name: str
-    setup: str  # its name in the table
-    with_pose: bool
-    parameters: EstimationParameters
+def methods_of(setup: Setup) -> Iterator[tuple[dict[str, str], bool, EstimationParameters]]:
+    """Yield the names of each method and its setup, whether it has the pose, and its parameters.
 
-
-def methods_of(setup: Setup) -> list[Method]:
-    """Return the methods to evaluate. All know how uneven the mud is, as an operator would see."""
+    All know how uneven the mud is, as an operator would see.
+    """
     known = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_error_m)
-    names = (DEFAULT, PAPER) if setup.fixed_base else (DEFAULT, PAPER, COMPENSATED)
-    methods = [Method(name, setup.name, True, with_method(known, name)) for name in names]
-    without_pose = Method(DEFAULT, f"{setup.name} without pose", False, known)
-    return methods if setup.fixed_base else [*methods, without_pose]
+    for name in (DEFAULT, PAPER) if setup.fixed_base else (DEFAULT, PAPER, COMPENSATED):
+        yield {"setup": setup.name, "method": name}, True, with_method(known, name)
+    if not setup.fixed_base:
+        yield {"setup": f"{setup.name} without pose", "method": DEFAULT}, False, known
 
 
 def run_part(
@@ -199,39 +195,34 @@ def run_part(
     own = SETUPS[setup] if REPEATS in layers else replace(SETUPS[setup], row_period_s=0.0)
     torque_error = TORQUE_ERROR if TORQUE in layers else 0.0
     trial = run_trial(own, track, disturbances, strides, seed, torque_error, LATENCY_S if LATENCY in layers else 0.0)
-    truths = {
-        (truth.flipper, truth.index): load_cell_truth(
-            truth, trial.configuration.geometry, disturbances.relaxation, own.gait.pause_s
-        )
-        for truth in trial.truths
-    }
+    leaning, upright = (
+        {
+            (truth.flipper, truth.index): true_coefficients(
+                truth, trial.configuration.geometry, disturbances.relaxation, own.gait.pause_s, is_upright
+            )
+            for truth in trial.truths
+        }
+        for is_upright in (False, True)
+    )
     if len(clays) > 1:
-        return {"evaluated": [], "transitions": transitions_of(trial, truths)}
-    evaluated = [_evaluate_method(method, clays[0].name, trial, truths, seed) for method in methods_of(own)]
-    return {"evaluated": list(chain.from_iterable(evaluated)), "transitions": []}
-
-
-def _evaluate_method(
-    method: Method, mud: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], seed: int
-) -> Iterator[Row]:
-    for stride, _ in replay_trial(trial, method.parameters, method.with_pose):
-        truth = truths.get((stride.flipper, stride.index))
-        for name in COEFFICIENTS if truth else ():
-            estimate, leaning, upright = (getattr(each, name) for each in (stride, *(truth or ())))
-            if isfinite(leaning):
-                yield evaluation_of(
-                    method.setup, mud, name, method.name, estimate, leaning, upright, f"{seed} {stride.flipper}"
-                )
+        return {"evaluated": [], "transitions": transitions_of(trial, leaning)}
+    evaluated: list[Row] = []
+    for names, with_pose, parameters in methods_of(own):
+        for stride, _ in replay_trial(trial, parameters, with_pose):
+            keys = names | {"mud": clays[0].name, "trial": f"{seed} {stride.flipper}"}
+            number = stride.flipper, stride.index
+            rows = compared_rows(stride_report(stride), leaning.get(number, {}), upright.get(number, {}), **keys)
+            evaluated += [row for row in rows if row["truth"] is not None]
+    return {"evaluated": evaluated, "transitions": []}
 
 
 # tables and figure
 
 
-def _table(
-    name: str, title: str, rows: Sequence[Row], columns: Mapping[str, tuple[str, Callable[[Any], str]]]
-) -> Table:
-    shown = [{head: show(row[key]) for head, (key, show) in columns.items()} for row in rows]
-    return Table(name, title, {}, DataFrame(shown))
+def _table(name: str, title: str, rows: Sequence[Row], columns: Columns) -> Table:
+    return Table(
+        name, title, {}, DataFrame([{head: show(row[key]) for head, (key, show) in columns.items()} for row in rows])
+    )
 
 
 def _percent(value: float | None) -> str:
@@ -272,14 +263,15 @@ BOUNDARY_COLUMNS: Columns = {
 
 def draw_errors(errors: Sequence[Row]) -> Drawing:
     """Draw median and 95th percentile of the error by setup, coefficient, mud and method."""
-    setups = list(dict.fromkeys(row["setup"] for row in errors))
+    rows = DataFrame(errors)
+    setups = rows["setup"].unique()
     figure = Drawing(figsize=(4.0 * len(COEFFICIENTS), 2.8 * len(setups)))
     panels = figure.subplots(len(setups), len(COEFFICIENTS), squeeze=False)
-    for panel_row, setup in zip(panels, setups, strict=True):
-        panel_row[0].set_ylabel("error (%)")
-        for panel, name in zip(panel_row, COEFFICIENTS, strict=True):
-            _draw_panel(panel, [each for each in errors if (each["setup"], each["coefficient"]) == (setup, name)])
-            panel.set_title(f"{setup}: ${name}$")
+    for (setup, name), panel in zip(product(setups, COEFFICIENTS), panels.flat, strict=True):
+        _draw_panel(panel, rows[(rows["setup"] == setup) & (rows["coefficient"] == name)])
+        panel.set_title(f"{setup}: ${name}$")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("error (%)")
     methods = {
         name: line for panel in panels.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
     }
@@ -287,23 +279,20 @@ def draw_errors(errors: Sequence[Row]) -> Drawing:
     return figure
 
 
-def _draw_panel(panel: Axes, rows: Sequence[Row]) -> None:
-    muds = list(dict.fromkeys(row["mud"] for row in rows))
+def _draw_panel(panel: Axes, rows: DataFrame) -> None:
+    muds = rows["mud"].unique().tolist()
     for method, colour in COLOURS.items():
-        if method == "paper compensated" and rows and rows[0]["coefficient"] != "k_s":
+        if method == COMPENSATED and "k_s" not in rows["coefficient"].unique():
             continue  # it compensates k_s alone
-        known = [row for row in rows if row["method"] == method and row["median"] is not None]
-        xs = [muds.index(row["mud"]) for row in known]
-        medians, highest = ([min(100.0 * row[key], HIGHEST_PERCENT) for row in known] for key in ("median", "p95"))
+        known = rows[(rows["method"] == method) & rows["median"].notna()]
+        xs = known["mud"].map(muds.index)
+        medians, highest = ((100.0 * known[key].astype(float)).clip(upper=HIGHEST_PERCENT) for key in ("median", "p95"))
         panel.vlines(xs, medians, highest, color=colour, linewidth=2)
         panel.plot(xs, medians, "o", color=colour, label=method)
-    for row in rows:
-        if row["method"] == "default" and row["bounds"] and not row["strides"]:
-            panel.text(muds.index(row["mud"]), 2.0, "bounds", ha="center", color=COLOURS["default"], fontsize="small")
+    for mud in rows.loc[(rows["method"] == DEFAULT) & (rows["bounds"] > 0) & (rows["strides"] == 0), "mud"]:
+        panel.text(muds.index(mud), 2.0, "bounds", ha="center", color=COLOURS[DEFAULT], fontsize="small")
     panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), list(map(mud_text, muds)))
-    panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
-    panel.set_ylim(0.0, HIGHEST_PERCENT)
     panel.set_yscale("symlog", linthresh=20.0)
     panel.set_yticks([0, 5, 10, 20, 50, 100], ["0", "5", "10", "20", "50", "100"])
-    panel.set_xlabel("mud")
+    panel.set(xlabel="mud", xlim=(-0.5, max(len(muds), 1) - 0.5), ylim=(0.0, HIGHEST_PERCENT))

@@ -10,14 +10,16 @@ from typing import Annotated, Literal
 
 from control.records import TWO_FLIPPERS, Rig
 from experiments.flipper.measurement import measure, require_bench
-from experiments.flipper.report import report_of, result_of, trials_by_mud
+from experiments.flipper.report import result_of, trials_by_mud
 from experiments.reports.mud_names import mud_name
-from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.study.notebook import Notebook
 from experiments.study.option import Option
+from experiments.study.prompt import Operator
 from experiments.study.result import Result
 from experiments.study.session import Session
-from experiments.trials.mud_trials import SEED, PlannedTrial, open_bench, require_named, run_trials
-from experiments.trials.simulated_bed import CarriedBed, simulated_bench
+from experiments.trials.mud_trials import Bench, PlannedTrial, open_bench, require_named, run_trials
+from experiments.trials.simulated_bed import simulated_bench
 from experiments.trials.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
 from experiments.trials.truth_file import load_truth
 from firmware_host.configuration.configuration import Configuration
@@ -76,26 +78,22 @@ def study(
     } | ({"motors": motors} if motors == 2 else {})
     known = load_truth(truth) if truth else None
     rig = Rig((flipper,)) if motors == 2 else TWO_FLIPPERS
-    simulated = partial(flipper_bench, session.folder, muds, SEED, rig)
+    simulated = partial(flipper_bench, session.operator, muds=muds, rig=rig)
     bench = open_bench(session, settings, lambda trial: INSTRUCTIONS, simulated, partial(require_bench, flipper))
     measure_trial = partial(measure, bench, flipper, depth / 100.0, strides)
     configuration, entries, logs = run_trials(bench, session, planned, measure_trial)
-    by_mud = trials_by_mud(muds, entries)
-    report = report_of(settings, by_mud, configuration, known, bench.notebook.left_out)
-    return result_of(report, by_mud, configuration, logs)
+    return result_of(settings, trials_by_mud(muds, entries), configuration, known, bench.notebook.left_out, logs)
 
 
 def bench_configuration(rig: Rig = TWO_FLIPPERS) -> Configuration:
     return simulated_configuration(SECTIONS, DRIVE, rig=rig)
 
 
-def flipper_bench(
-    folder: Path, muds: Sequence[str], seed: int, rig: Rig = TWO_FLIPPERS
-) -> tuple[LockstepRobot, CarriedBed]:
+def flipper_bench(operator: Operator, notebook: Notebook, muds: Sequence[str], rig: Rig = TWO_FLIPPERS) -> Bench:
     """Make a robot over strips of muds, named after their water content. Raises ValueError for an unknown mud."""
     track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
         return STRIP_M * muds.index(trial.group) + TRIAL_M * (prepared + 1)
 
-    return simulated_bench(folder, bench_configuration(rig), track, seed, position_m, AT_EVERY_TICK)
+    return simulated_bench(operator, notebook, bench_configuration(rig), track, position_m, AT_EVERY_TICK)

@@ -148,72 +148,59 @@ def draw(muds: Sequence[Summary]) -> Drawing:
     for i, method in enumerate(methods):
         colour = METHOD_COLOURS[i % len(METHOD_COLOURS)]
         shifted_kpa = strengths_kpa * OFFSET ** (i - (len(methods) - 1) / 2.0)
-        settled = [mud["methods"][method] for mud in muds]
-        _draw_choice(over, settled, shifted_kpa, method, colour)
-        _draw_fraction(below, settled, shifted_kpa, method, colour, 7 if i == 0 else -12 * i)
-    _name_axes(over, below, strengths_kpa)
+        settled = DataFrame([mud["methods"][method] for mud in muds]).assign(kpa=shifted_kpa)
+        _draw_choice(over, settled, method, colour)
+        _draw_fraction(below, settled, method, colour, 7 if i == 0 else -12 * i)
+    over.invert_yaxis()
+    over.set(ylabel="insertion depth (cm)", title="Speed of constant depths, and where the adaptation settles")
+    over.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
+    below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
+    below.set(
+        xscale="log",
+        xlabel="undrained strength of the mud (kPa); numbers at the dots: failed strides after the second",
+        ylabel="% of the best constant depth",
+        ylim=(0.0, max(130.0, below.get_ylim()[1])),
+    )
+    below.set_xticks(strengths_kpa, [f"{strength:g}" for strength in strengths_kpa])
+    below.minorticks_off()
+    below.legend(loc="lower left")
     return figure
 
 
 def _draw_map(figure: Drawing, panel: Axes, muds: Sequence[Summary], strengths_kpa: NDArray[np.float64]) -> None:
-    depths_cm = np.array([each["depth_cm"] for each in muds[0]["constant"]])
-    speeds = np.array([[each["mean"] for each in mud["constant"]] for mud in muds]).T
-    edges = np.exp(_edges(np.log(strengths_kpa))), _edges(depths_cm)
+    constant = DataFrame([{"kpa": mud["strength_pa"] / 1000.0} | each for mud in muds for each in mud["constant"]])
+    speeds = constant.pivot(index="depth_cm", columns="kpa", values="mean")
+    edges = np.exp(_edges(np.log(strengths_kpa))), _edges(speeds.index.to_numpy())
     mesh = panel.pcolormesh(*edges, speeds, cmap="viridis", vmin=0.0)
     figure.colorbar(mesh, ax=panel, label="speed (cm/s)", pad=0.01)
     for name, mark in MARKS.items():
-        failed = [
-            (mud["strength_pa"] / 1000.0, each["depth_cm"])
-            for mud in muds
-            for each in mud["constant"]
-            if each["failures"].get(name, 0) > 0.1 * each["strides"]
-        ]
-        panel.plot([x for x, _ in failed], [y for _, y in failed], mark, color="#ffffff90", markeredgecolor="none",
-                   markersize=5, label=f"{name} in more than a tenth of the strides")  # fmt: skip
+        failed = constant[[failures.get(name, 0) for failures in constant["failures"]] > 0.1 * constant["strides"]]
+        panel.plot(failed["kpa"], failed["depth_cm"], mark, color="#ffffff90", markeredgecolor="none", markersize=5,
+                   label=f"{name} in more than a tenth of the strides")  # fmt: skip
 
 
 def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the edges of the cells around the centres."""
-    halves = np.diff(centres) / 2.0 if len(centres) > 1 else np.array([0.1])
-    return np.concatenate(
-        [centres[:1] - halves[0], centres[:-1] + halves[: len(centres) - 1], centres[-1:] + halves[-1]]
-    )
+    halves = np.diff(centres) / 2.0
+    first, last = (halves[0], halves[-1]) if len(halves) else (0.1, 0.1)
+    return np.concatenate([centres[:1] - first, centres[:-1] + halves, centres[-1:] + last])
 
 
-def _draw_choice(
-    panel: Axes, settled: Sequence[Summary], strengths_kpa: NDArray[np.float64], method: str, colour: str
-) -> None:
+def _draw_choice(panel: Axes, settled: DataFrame, method: str, colour: str) -> None:
     """Draw the depths at which the method settled, with their range."""
-    known = [(x, each) for x, each in zip(strengths_kpa, settled, strict=True) if each["depth_cm"] is not None]
-    depths_cm = np.array([each["depth_cm"] for _, each in known])
-    errors_cm = abs(np.array([each["depth_range_cm"] for _, each in known]).reshape(-1, 2).T - depths_cm)
-    panel.errorbar([x for x, _ in known], depths_cm, errors_cm, color=colour, label=f"method {method}",
+    known = settled.dropna(subset="depth_cm")
+    depths_cm = known["depth_cm"].to_numpy(float)
+    errors_cm = abs(np.array(known["depth_range_cm"].tolist()).reshape(-1, 2).T - depths_cm)
+    panel.errorbar(known["kpa"], depths_cm, errors_cm, color=colour, label=f"method {method}",
                    fmt="o", markeredgecolor="black", markersize=7, capsize=3, linewidth=1.2)  # fmt: skip
 
 
-def _draw_fraction(
-    panel: Axes, settled: Sequence[Summary], strengths_kpa: NDArray[np.float64], method: str, colour: str, points: int
-) -> None:
+def _draw_fraction(panel: Axes, settled: DataFrame, method: str, colour: str, points: int) -> None:
     """Draw the fractions of the best speed; failures are written `points` above the dots."""
-    percent = [100.0 * (each["fraction_of_best"] or 0.0) for each in settled]
+    settled = settled.assign(percent=100.0 * settled["fraction_of_best"].astype(float).fillna(0.0))
     line = TEXT if colour == "white" else colour
-    panel.plot(strengths_kpa, percent, "-o", color=line, markerfacecolor=colour, markersize=6, label=method)
-    for strength, height, each in zip(strengths_kpa, percent, settled, strict=True):
-        if failed := sum(each["failures"].values()):
-            panel.annotate(f"{failed}/{each['strides']}", (strength, height), color=line, fontsize="x-small",
+    panel.plot("kpa", "percent", "-o", data=settled, color=line, markerfacecolor=colour, markersize=6, label=method)
+    for each in settled.itertuples():
+        if failed := sum(each.failures.values()):
+            panel.annotate(f"{failed}/{each.strides}", (each.kpa, each.percent), color=line, fontsize="x-small",
                            textcoords="offset points", xytext=(0, points), ha="center")  # fmt: skip
-
-
-def _name_axes(over: Axes, below: Axes, strengths_kpa: NDArray[np.float64]) -> None:
-    over.set_ylabel("insertion depth (cm)")
-    over.invert_yaxis()
-    over.set_title("Speed of constant depths, and where the adaptation settles")
-    over.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
-    below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
-    below.set_ylim(0.0, max(130.0, below.get_ylim()[1]))
-    below.set_ylabel("% of the best constant depth")
-    below.set_xlabel("undrained strength of the mud (kPa); numbers at the dots: failed strides after the second")
-    below.set_xscale("log")
-    below.set_xticks(strengths_kpa, [f"{strength:g}" for strength in strengths_kpa])
-    below.minorticks_off()
-    below.legend(loc="lower left")

@@ -9,24 +9,26 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from experiments.reports.mud_names import mud_name
-from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.study.notebook import Notebook
 from experiments.study.option import Option
+from experiments.study.prompt import Operator
 from experiments.study.result import Result
 from experiments.study.session import Session
 from experiments.study.values import mud_length
 from experiments.trackway.bench import muds_of
 from experiments.trials.mud_trials import (
     MOST_ATTEMPTS,
-    SEED,
+    Bench,
     PlannedTrial,
     open_bench,
     require_named,
     run_trials,
 )
-from experiments.trials.simulated_bed import CarriedBed, simulated_bench
+from experiments.trials.simulated_bed import simulated_bench
 from experiments.trials.truth_file import load_truth
 from experiments.walk.measurement import MUDS, SOFT, WalkTrials, measure
-from experiments.walk.report import report_of, result_of
+from experiments.walk.report import result_of
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -70,17 +72,16 @@ def study(
         muds=muds, trials=trials, depth_m=depth / 100.0, soft=softs, flipper=flipper, simulated=session.simulated
     )
     known = load_truth(truth) if truth else None
-    bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.folder, plan, SEED))
+    bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.operator, plan))
     configuration, entries, logs = run_trials(bench, session, plan.planned, partial(measure, bench, plan))
-    report = report_of(plan, entries, configuration, known, bench.notebook.left_out)
-    return result_of(report, plan, entries, configuration, known, logs)
+    return result_of(plan, entries, configuration, known, bench.notebook.left_out, logs)
 
 
 def _instructions(trial: PlannedTrial) -> str:
     return TRACKWAY_INSTRUCTIONS if trial.key.startswith("walk/") else SOFT_INSTRUCTIONS
 
 
-def walking_bench(folder: Path, plan: WalkTrials, seed: int) -> tuple[LockstepRobot, CarriedBed]:
+def walking_bench(operator: Operator, plan: WalkTrials, notebook: Notebook) -> Bench:
     """Make a robot over the plan's muds, named after their water content. Raises ValueError for an unknown mud."""
     lengths_m = [length_m for _, length_m in plan.muds]
     lengths_m[-1] += TAIL_M
@@ -96,4 +97,6 @@ def walking_bench(folder: Path, plan: WalkTrials, seed: int) -> tuple[LockstepRo
             return prepared * fsum(lengths_m)
         return copies * fsum(lengths_m) + STRIP_M * strips[trial.group] + SOFT_WALK_M * (prepared + 1)
 
-    return simulated_bench(folder, simulated_configuration(SECTIONS), Track(trackway * copies + soft), seed, position_m)
+    return simulated_bench(
+        operator, notebook, simulated_configuration(SECTIONS), Track(trackway * copies + soft), position_m
+    )

@@ -8,9 +8,10 @@ from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_key, mud_text
 from experiments.study.notebook import Entry
 from experiments.study.result import Table
-from experiments.trials.estimation_methods import DEFAULT
+from experiments.trials.estimation_methods import DEFAULT, configured_method
 from experiments.trials.load_cell_truth import OTHER_PLATE
 from experiments.trials.truth_file import TruthOfMud
+from firmware_host.configuration.configuration import Configuration
 
 TRUTHS = {
     "bed": "The load cell is a virtual one: it repeats each stroke with the flipper's own plate, to the same depth. "
@@ -43,9 +44,10 @@ COMPARISON = "Comparison with the load cell"  # a part of the page
 
 
 def truth_settings(
-    settings: Mapping[str, Any], method: str, truth: TruthOfMud | None, muds: Iterable[str]
+    settings: Mapping[str, Any], configuration: Configuration, truth: TruthOfMud | None, muds: Iterable[str]
 ) -> dict[str, Any]:
     """Return the part of a summary with the settings, and a sentence with the muds that a truth file lacks."""
+    method = configured_method(configuration.estimation)
     missing = [mud_text(mud) for mud in muds if truth is not None and mud_key(mud) not in truth]
     return {
         "settings": {**settings, "method": method, "truth": "file" if truth else "bed"},

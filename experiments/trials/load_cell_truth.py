@@ -9,16 +9,13 @@ one lean stands for a growing one, and the cell reads 4 % more k_p at 3 cm, 13 %
 is 1 to 6 % more than the upright plate's at each of these depths.)
 """
 
-from collections.abc import Sequence
 from math import cos, fsum, isfinite, sin
-from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import SubmergedPlate, submerged_part
-from control.records import UNKNOWN
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
-from simulation.test_rig.joint_cell import ArcCurve, measure_arc
-from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
+from simulation.test_rig.joint_cell import measure_arc
+from simulation.test_rig.load_cell import measure_insertion, measure_shear
 
 PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip
 SHEAR_PATH_M = 0.08
@@ -32,33 +29,19 @@ OTHER_PLATE = (
 )
 
 
-class TrueCoefficients(NamedTuple):
-    """Coefficients in N/m³; NaN where the stroke did not happen."""
-
-    k_p: float
-    k_s: float
-    k_e: float
-
-
-class LoadCellTruth(NamedTuple):
-    leaning: TrueCoefficients  # the plate as the flipper carries it
-    upright: TrueCoefficients  # the plate as the paper's load cell carries it
-
-
-def load_cell_truth(stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float) -> LoadCellTruth:
-    leaning, upright = (true_coefficients(stride, geometry, relaxation, hold_s, upright) for upright in (False, True))
-    return LoadCellTruth(leaning, upright)
+Truth = dict[str, float]  # N/m³ by coefficient, without those whose stroke did not happen
 
 
 def true_coefficients(
     stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float, upright: bool
-) -> TrueCoefficients:
-    """Return the coefficients of one of the two plates."""
-    return TrueCoefficients(
-        k_p=_stiffness(stride, stride.insertion, 1.0, geometry, relaxation, 0.0, upright),
-        k_s=_shear(stride, geometry, upright),
-        k_e=_stiffness(stride, stride.extraction, -1.0, geometry, relaxation, hold_s, upright),
-    )
+) -> Truth:
+    """Return the coefficients of the plate as the paper's load cell carries it, upright, or as the flipper does."""
+    found = {
+        "k_p": _stiffness(stride, stride.insertion, 1.0, geometry, relaxation, 0.0, upright),
+        "k_s": _shear(stride, geometry, upright),
+        "k_e": _stiffness(stride, stride.extraction, -1.0, geometry, relaxation, hold_s, upright),
+    }
+    return {name: k_n_m3 for name, k_n_m3 in found.items() if k_n_m3 is not None}
 
 
 def _stiffness(
@@ -69,23 +52,30 @@ def _stiffness(
     relaxation: float,
     hold_s: float,
     upright: bool,
-) -> float:
-    """Return the coefficient of a stroke down (sign 1) or up (sign -1), by least squares."""
+) -> float | None:
+    """Return k of F = k V or τ = k Φ in a stroke down (sign 1) or up (sign -1), by least squares from the surface."""
     if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
-        return UNKNOWN
+        return None
     deepest_m, motion = stroke.deepest_m, (stroke.deepest_m, stroke.speed_m_s, relaxation, hold_s)
     fitted_m = deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * deepest_m
+    rows: list[tuple[float, float]] = []  # V and F, or Φ and τ
     if upright:
         straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, *motion)
-        return _straight_stiffness(straight.down if sign > 0.0 else straight.up, sign, geometry, fitted_m)
-    arc = measure_arc(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, *motion)
-    return _arc_stiffness(arc.down if sign > 0.0 else arc.up, sign, fitted_m)
+        for depth_m, force_n in zip(*(straight.down if sign > 0.0 else straight.up), strict=True):
+            if 0.0 < depth_m <= fitted_m:
+                rows.append((geometry.plate_thickness_m * _plate(geometry, 0.0, depth_m).area_m2, force_n))
+    else:
+        arc = measure_arc(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, *motion)
+        curve = zip(*(arc.down if sign > 0.0 else arc.up), strict=True)
+        rows = [(moment_m4, moment_nm) for depth_m, moment_m4, moment_nm in curve if 0.0 < depth_m <= fitted_m]
+    square = fsum(x * x for x, _ in rows)
+    return fsum(x * sign * y for x, y in rows) / square if square > 0.0 else None
 
 
-def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> float:
+def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> float | None:
     stroke = stride.stance
     if not stroke.deepest_m > 0.0:
-        return UNKNOWN
+        return None
     speed_m_s = stroke.speed_m_s if isfinite(stroke.speed_m_s) else PAPER_SPEED_M_S
     adduction_rad = 0.0 if upright else stroke.adduction_rad
     force_n = measure_shear(stride.clay, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_PATH_M)
@@ -95,21 +85,3 @@ def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> flo
 def _plate(geometry: FlipperGeometry, adduction_rad: float, depth_m: float) -> SubmergedPlate:
     """Return the plate perpendicular to its motion."""
     return submerged_part(geometry, depth_m, -sin(adduction_rad), cos(adduction_rad))
-
-
-def _straight_stiffness(curve: LoadCurve, sign: float, geometry: FlipperGeometry, to_depth_m: float) -> float:
-    """Fit k of F = k V by least squares, between the surface and `to_depth_m`."""
-    rows = [row for row in zip(curve.depths_m, curve.forces_n, strict=True) if 0.0 < row[0] <= to_depth_m]
-    volumes = [geometry.plate_thickness_m * _plate(geometry, 0.0, depth_m).area_m2 for depth_m, _ in rows]
-    return _slope(volumes, [sign * force_n for _, force_n in rows])
-
-
-def _arc_stiffness(curve: ArcCurve, sign: float, to_depth_m: float) -> float:
-    """Fit k of τ = k Φ by least squares, over the same part."""
-    rows = [row for row in zip(*curve, strict=True) if 0.0 < row[0] <= to_depth_m]
-    return _slope([moment_m4 for _, moment_m4, _ in rows], [sign * moment_nm for _, _, moment_nm in rows])
-
-
-def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    square = fsum(a * a for a in x)
-    return fsum(a * b for a, b in zip(x, y, strict=True)) / square if square > 0.0 else UNKNOWN

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from experiments.reports.mud_names import mud_text
 from experiments.robot.bench_errors import BenchError
@@ -21,12 +21,12 @@ from experiments.study.notebook import Entry, Notebook
 from experiments.study.option import OptionError
 from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.session import Session
+from experiments.trials.load_cell_truth import Truth
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import clay_of_water
 
 MOST_ATTEMPTS = 3  # of one trial, after which Enter ends the experiment
-SEED = 1  # of a simulated bench
 KEEP = "k"  # the key of an answer
 POLL_S = 0.05  # of a prompt, in which the lease is renewed
 PREPARED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
@@ -35,7 +35,7 @@ INVALID_OFTEN = {GO_ON: "end here", REDO: "repeat it", SKIP: "leave it out"}
 KEPT = {KEEP: "keep it as it is"}
 DOUBTFUL = {GO_ON: "keep it", REDO: "measure it again", SKIP: "leave it out"}
 
-Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
+Truths = dict[int, Truth]  # by stride
 
 
 class PlannedTrial(NamedTuple):
@@ -56,40 +56,28 @@ class InvalidTrialError(Exception):
         self.entry = entry
 
 
-class MudBed(Protocol):
-    """The mud under the robot."""
-
-    def prepare(self, trial: PlannedTrial) -> str:
-        """Level fresh mud in front of the robot; return GO_ON, SKIP this trial, or REDO the one before."""
-
-    def truths(self, flipper: str) -> Truths:
-        """Return the load cell's readings in the strides of the last walk; nothing without a load cell."""
-
-
-class PromptedBed:
-    """A MudBed that the operator prepares, with torque off."""
-
-    def __init__(self, robot: BenchRobot, operator: Operator, instructions: Callable[[PlannedTrial], str]) -> None:
-        self._robot = robot
-        self._operator = operator
-        self._instructions = instructions
-
-    def prepare(self, trial: PlannedTrial) -> str:
-        disarm(self._robot)
-        ask_to_clear_faults(self._robot, self._operator)
-        return self._operator.ask(f"{trial}. {self._instructions(trial)}", PREPARED, partial(self._robot.wait, POLL_S))
-
-    def truths(self, flipper: str) -> Truths:
-        return {}
-
-
 class Bench(NamedTuple):
     """The robot with its mud, its operator and its notebook."""
 
     robot: BenchRobot
-    bed: MudBed
     operator: Operator
     notebook: Notebook
+    # levels fresh mud in front of the robot; returns GO_ON, SKIP this trial, or REDO the one before
+    prepare: Callable[[PlannedTrial], str]
+    # returns a load cell's readings in a flipper's strides of the last walk
+    truths: Callable[[str], Truths] = lambda flipper: {}
+
+    def ask(self, question: str, answers: Mapping[str, str]) -> str:
+        return self.operator.ask(question, answers, partial(self.robot.wait, POLL_S))
+
+
+def prepare_by_hand(
+    robot: BenchRobot, operator: Operator, instructions: Callable[[PlannedTrial], str], trial: PlannedTrial
+) -> str:
+    """Let the operator level the mud, with torque off."""
+    disarm(robot)
+    ask_to_clear_faults(robot, operator)
+    return operator.ask(f"{trial}. {instructions(trial)}", PREPARED, partial(robot.wait, POLL_S))
 
 
 Measure = Callable[[PlannedTrial], Entry]  # raises InvalidTrialError, BenchError; an entry has "remarks"
@@ -101,9 +89,7 @@ def conduct_trials(
     """Measure all trials that are not in the notebook. Raises BenchError where one cannot be measured."""
     attempts = Counter[str]()
     steps = [
-        OperatorStep(
-            trial.key, partial(bench.bed.prepare, trial), partial(_measure_once, bench, trial, measure, attempts)
-        )
+        OperatorStep(trial.key, partial(bench.prepare, trial), partial(_measure_once, bench, trial, measure, attempts))
         for trial in planned
     ]
     conduct_steps(steps, bench.notebook, bench.operator, show, _left_out())
@@ -128,7 +114,7 @@ def _measure_once(bench: Bench, trial: PlannedTrial, measure: Measure, attempts:
 def _settle(bench: Bench, trial: PlannedTrial, entry: Entry) -> Entry | None:
     for remark in entry["remarks"]:
         bench.operator.report(f"{trial}: {remark}")
-    answer = _ask(bench, "Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
+    answer = bench.ask("Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
     return {GO_ON: entry, SKIP: _left_out(entry["remarks"])}.get(answer)
 
 
@@ -137,16 +123,12 @@ def _settle_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attem
     entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
     message = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
-    answer = _ask(bench, message, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
+    answer = bench.ask(message, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
     if often and answer == GO_ON:
         raise BenchError(message) from problem
     if answer == KEEP and entry is not None:
         return entry | {"remarks": [*entry["remarks"], str(problem)]}
     return _left_out([str(problem)]) if answer == SKIP else None
-
-
-def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
-    return bench.operator.ask(question, answers, partial(bench.robot.wait, POLL_S))
 
 
 def _left_out(why: Sequence[str] = ()) -> Entry:
@@ -167,7 +149,7 @@ def open_bench(
     session: Session,
     plan: Entry,
     instructions: Callable[[PlannedTrial], str],
-    simulated: Callable[[], tuple[BenchRobot, MudBed]] | None = None,
+    simulated: Callable[[Notebook], Bench] | None = None,
     check: Callable[[Configuration], None] = lambda configuration: None,
 ) -> Bench:
     """Connect to the daemon's robot, or make a simulated one in a session without a daemon.
@@ -179,8 +161,7 @@ def open_bench(
     plan = {**plan, **session.program}
     if session.socket is None:
         assert simulated is not None
-        notebook = Notebook(session.folder, plan)
-        return Bench(*simulated(), session.operator, notebook)
+        return simulated(Notebook(session.folder, plan))
     robot = DaemonRobot(session.socket)
     try:
         check(robot.configuration)
@@ -190,7 +171,7 @@ def open_bench(
     except BaseException:
         robot.close()
         raise
-    return Bench(robot, PromptedBed(robot, session.operator, instructions), session.operator, notebook)
+    return Bench(robot, session.operator, notebook, partial(prepare_by_hand, robot, session.operator, instructions))
 
 
 def run_trials(

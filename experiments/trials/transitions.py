@@ -5,48 +5,44 @@ once the flipper's current k_p is within FOLLOWED of the truth in that mud; the 
 """
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 from pandas import DataFrame
 
 from control.mud_estimate import MudEstimate
-from experiments.trials.load_cell_truth import LoadCellTruth
+from experiments.trials.load_cell_truth import Truth
 from experiments.trials.trial import Trial, replay_trial
 from simulation.body.reference_sensor import StrideTruth
 
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 
 
-def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[dict[str, Any]]:
+def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], Truth]) -> list[dict[str, Any]]:
     """Return each step of a flipper from one mud into the next, with the strides until the estimate followed.
 
-    They are None where it did not follow before the next border or the end.
+    They are None where it did not follow before the next border or the end. `truths` are by flipper and stride.
     """
-    replayed = replay_trial(trial, trial.configuration.estimation)
-    estimates = {stride.index: estimate for stride, estimate in replayed}
+    estimates = {stride.index: estimate for stride, estimate in replay_trial(trial, trial.configuration.estimation)}
     transitions: list[dict[str, Any]] = []
     for flipper in trial.configuration.rig.flippers:
         strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
-        muds = [stride.clay.name for stride in strides]
-        starts = [i for i in range(1, len(strides)) if muds[i] != muds[i - 1]]
-        for start, end in pairwise([*starts, len(strides)]):
-            close = [_is_close(stride, truths, estimates) for stride in strides[start:end]]
+        by_mud = [(mud, [*own]) for mud, own in groupby(strides, key=lambda stride: stride.clay.name)]
+        for (before, _), (after, own) in pairwise(by_mud):
+            close = [_is_close(stride, truths, estimates) for stride in own]
             followed = close.index(True) + 1 if True in close else None
-            transitions.append(
-                {"before": muds[start - 1], "after": muds[start], "flipper": flipper, "strides": followed}
-            )
+            transitions.append({"before": before, "after": after, "flipper": flipper, "strides": followed})
     return transitions
 
 
 def _is_close(
-    stride: StrideTruth, truths: Mapping[tuple[str, int], LoadCellTruth], estimates: Mapping[int, MudEstimate]
+    stride: StrideTruth, truths: Mapping[tuple[str, int], Truth], estimates: Mapping[int, MudEstimate]
 ) -> bool:
-    estimate = estimates[stride.index].of(stride.flipper).k_p
-    if estimate is None:
+    estimate, truth = estimates[stride.index].of(stride.flipper).k_p, truths[stride.flipper, stride.index].get("k_p")
+    if estimate is None or truth is None:
         return False
     value, _ = estimate.at(max(stride.insertion.deepest_m, stride.stance.deepest_m))  # the depth that a stride reports
-    return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
+    return bool(abs(value / truth - 1.0) <= FOLLOWED)
 
 
 def transition_rows(transitions: DataFrame) -> list[dict[str, Any]]:

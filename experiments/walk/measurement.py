@@ -8,7 +8,7 @@ drag and not the mud's strength while the body moves. Every method of estimation
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import chain
+from functools import partial
 from math import ceil
 from typing import Any
 
@@ -18,6 +18,7 @@ from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
     Status,
+    WalkMonitor,
     arm,
     count_strides,
     fetch_strides,
@@ -31,8 +32,8 @@ from experiments.study.notebook import Entry
 from experiments.trackway.bench import UNSEEN, UNSEEN_S, Muds, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
-from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
-from experiments.walk.known_surface import strides_with_known_surface
+from experiments.trials.stride_profile import WALK_PERIOD, profile_lists, profile_of, slip_m, thinned, walk_profile
+from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED, k_s_of
 from logs.files.log_reader import Log
 
 MUDS: Muds = tuple((name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
@@ -104,7 +105,7 @@ def _walk_over(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     ordered = ceil(length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
     ordered *= 1 if start_m is None else SLIP_ALLOWANCE
     robot.call("walk", depth_m=plan.depth_m, strides=ordered)
-    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m - reach_m, now_s).evaluate)
+    end, _ = follow_walk(robot, partial(monitor_advance, start_m, length_m - reach_m))
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
         raise InvalidTrialError(mode_reason(after))
@@ -113,15 +114,9 @@ def _walk_over(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     remarks = [] if start_m is not None else ["no pose arrives: strides are assigned to the muds by their order"]
     entry = _entry(bench, plan, trial, log, before["strides_closed"]) | {
         "start_m": start_m,
-        "course": profile_row(profile_of_walk(log, plan.flipper)),
+        "course": profile_lists(walk_profile(log, plan.flipper, WALK_PERIOD)),
         "remarks": remarks + [end] * bool(end),
     }
-    arm_m = robot.configuration.geometry.flipper_length_m
-    strides = list(chain.from_iterable(entry["strides"].values()))  # of all methods, which begin at the same times
-    starts_s = {stride["t_start_s"] for stride in strides}
-    slips_m = {start_s: slip_m(profile_of(log, plan.flipper, start_s), arm_m) for start_s in starts_s}
-    for stride in strides:
-        stride["slip_m"] = slips_m[stride["t_start_s"]]
     if after["notice"]:
         raise InvalidTrialError(after["notice"], entry)
     if end is None and made < ordered:
@@ -129,32 +124,31 @@ def _walk_over(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     return entry
 
 
-class Advance:
-    """Owns the progress of a walk. A walk without a position at its start makes all of its strides."""
+def monitor_advance(start_m: float | None, length_m: float, begun_s: float) -> WalkMonitor[str]:
+    """Return what says how a walk ends: empty at the proper end; it raises InvalidTrialError.
 
-    def __init__(self, start_m: float | None, length_m: float, now_s: float) -> None:
-        self._start_m = start_m
-        self._length_m = length_m
-        self._farthest_m = start_m or 0.0
-        self._seen_s = self._advanced_s = now_s
+    A walk without a position at its start makes all of its strides.
+    """
+    farthest_m, seen_s, advanced_s = start_m or 0.0, begun_s, begun_s
 
-    def evaluate(self, status: Status) -> str | None:
-        """Return None while the walk goes on, else why it ends; empty at the proper end. Raises InvalidTrialError."""
+    def evaluate(status: Status) -> str | None:
+        nonlocal farthest_m, seen_s, advanced_s
         now_s, body_m = status["now_s"], status["body_x_m"]
-        if self._start_m is None:
+        if start_m is None:
             return None
         if body_m is None:
-            if now_s - self._seen_s > UNSEEN_S:
+            if now_s - seen_s > UNSEEN_S:
                 raise InvalidTrialError(UNSEEN)
             return None
-        self._seen_s = now_s
-        if body_m > self._farthest_m + ADVANCED_M:
-            self._farthest_m, self._advanced_s = body_m, now_s
-        if body_m - self._start_m >= self._length_m and status["phase"] == "insertion":
+        seen_s = now_s
+        if body_m > farthest_m + ADVANCED_M:
+            farthest_m, advanced_s = body_m, now_s
+        if body_m - start_m >= length_m and status["phase"] == "insertion":
             return ""
-        if now_s - self._advanced_s > STUCK_S:
-            return f"the robot got stuck after {100.0 * (self._farthest_m - self._start_m):.0f} cm"
-        return None
+        stuck = now_s - advanced_s > STUCK_S
+        return f"the robot got stuck after {100.0 * (farthest_m - start_m):.0f} cm" if stuck else None
+
+    return evaluate
 
 
 def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
@@ -175,16 +169,23 @@ def _walk_in_soft(bench: Bench, plan: WalkTrials, trial: PlannedTrial, depth_m: 
     own = entry["strides"][configured_method(robot.configuration.estimation)]
     shown = own[min(DRAWN_STRIDE, len(own) - 1)]
     profile = thinned(profile_of(log, plan.flipper, shown["t_start_s"]))
-    return entry | {"depth_m": depth_m, "course": profile_row(profile), "remarks": []}
+    return entry | {"depth_m": depth_m, "course": profile_lists(profile), "remarks": []}
 
 
 def _entry(bench: Bench, plan: WalkTrials, trial: PlannedTrial, log: Log, closed: int) -> Entry:
-    """Return the part of an entry that all walks have. Raises InvalidTrialError."""
-    robot = bench.robot
+    """Return the part of an entry that all walks have: strides by every method. Raises InvalidTrialError."""
+    robot, configuration = bench.robot, bench.robot.configuration
     rest(robot)  # on a slow computer, the estimation takes longer than the robot may be left unattended
-    reported = fetch_strides(robot, closed)
-    strides = strides_by_method(reported, log, robot.configuration, plan.flipper, METHODS)
-    own = strides[configured_method(robot.configuration.estimation)]
-    require_mud(own, plan.flipper)
-    strides |= strides_with_known_surface(strides[DEFAULT], log, robot.configuration, plan.flipper)
-    return {"trial": trial.number, "strides": strides, "truths": bench.bed.truths(plan.flipper)}
+    strides = strides_by_method(fetch_strides(robot, closed), log, configuration, plan.flipper, METHODS)
+    require_mud(strides[configured_method(configuration.estimation)], plan.flipper)
+    profiles = [profile_of(log, plan.flipper, stride["t_start_s"]) for stride in strides[DEFAULT]]
+    for method, drag_n in ((KNOWN, 0.0), (KNOWN_COMPENSATED, configuration.adaptation.body_drag_n)):
+        strides[method] = [
+            stride | {"k_p": None, "k_e": None, "k_s": k_s_of(profile, stride, configuration, drag_n)}
+            for stride, profile in zip(strides[DEFAULT], profiles, strict=True)
+        ]
+    slips_m = [slip_m(profile, configuration.geometry.flipper_length_m) for profile in profiles]
+    for own in strides.values():  # the strides of all methods begin at the same times
+        for stride, own_slip_m in zip(own, slips_m, strict=True):
+            stride["slip_m"] = own_slip_m
+    return {"trial": trial.number, "strides": strides, "truths": bench.truths(plan.flipper)}

@@ -1,9 +1,9 @@
 """The walks over several muds as pictures, after the paper's figures 6 and 7."""
 
 from collections.abc import Mapping, Sequence
+from itertools import chain, pairwise
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pandas import DataFrame
@@ -13,14 +13,18 @@ from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import GREY, INK, LABELS
+from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.stride_profile import StrideProfile, profile_from_row
+from experiments.trials.stride_profile import profile_from, stroke_of
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import WalkTrials
 
-THIN: dict[str, Any] = {"linewidth": 0.8}
+STROKE_STYLES = {  # as in the paper
+    Phase.INSERTION: ("tab:blue", "-"),
+    Phase.STANCE: ("tab:green", "--"),
+    Phase.EXTRACTION: ("tab:orange", "-."),
+}
 METHOD_STYLES: dict[str, dict[str, Any]] = {
     DEFAULT: {"color": "tab:blue", "marker": "o"},
     PAPER: {"color": "tab:red", "marker": "x"},
@@ -41,69 +45,51 @@ DEPTH_STYLES: dict[float, dict[str, Any]] = {
 
 def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: float) -> Figure:
     """Draw position, forces and coefficients of one walk against time: figure 6."""
-    profile = profile_from_row(walk["course"])
-    own = strides[strides["trial"] == walk["trial"]]
-    begun_s = float(profile.time_s[0])
+    profile, own = profile_from(walk), strides[strides["trial"] == walk["trial"]]
+    begun_s, end_s = profile["time_s"].min(), profile["time_s"].max()
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
     figure = Figure(figsize=(9.0, 11.0))
     panels = figure.subplots(6, 1, sharex=True)
-    _draw_position(panels[0], walk, profile, begun_s)
-    _draw_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
-    upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
-    _draw_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
+    time_s = profile["time_s"] - begun_s
+    panels[0].set_ylabel("body (cm)")
+    if walk["start_m"] is None:
+        panels[0].text(0.5, 0.5, "no pose", transform=panels[0].transAxes, ha="center", color=GREY)
+    else:
+        panels[0].plot(time_s, 100.0 * (profile["body_x_m"] - walk["start_m"]), color=INK, linewidth=1.2)
+    upward_n = profile["force_z_n"].mask(profile["phase"] == Phase.STANCE)
+    for panel, force_n, label in (
+        (panels[1], profile["force_x_n"], "$f_x$ forward (N)"),
+        (panels[2], upward_n, "$f_z$ up (N)"),
+    ):
+        panel.plot(time_s, force_n, color="#bbbbbb", linewidth=0.8)  # outside of the strokes
+        for phase, (colour, style) in STROKE_STYLES.items():
+            stroke_n = force_n.where(profile["phase"] == phase)
+            if stroke_n.any():
+                panel.plot(time_s, stroke_n, style, color=colour, linewidth=1.3, label=PHASE_NAMES[phase])
+        panel.set_ylabel(label)
+        panel.legend(ncols=3, **LEGEND)
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
         _draw_coefficient(panel, plan, name, own[own["coefficient"] == name], begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
             panel.axvline(border_s - begun_s, color=INK, linewidth=1.0)
-    _name_muds(panels[0], plan, [begun_s, *borders_s, float(profile.time_s[-1])], begun_s)
-    panels[0].set_xlim(0.0, float(profile.time_s[-1]) - begun_s)
+    for (mud, _), (start_s, until_s) in zip(plan.muds, pairwise([begun_s, *borders_s, end_s]), strict=False):
+        middle_s = (start_s + until_s) / 2.0 - begun_s
+        panels[0].annotate(mud_text(mud), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
+    panels[0].set_xlim(0.0, end_s - begun_s)
     panels[-1].set_xlabel("time (s)")
     return figure
 
 
-def _borders_s(plan: WalkTrials, walk: Entry, profile: StrideProfile, own: DataFrame, reach_m: float) -> list[float]:
+def _borders_s(plan: WalkTrials, walk: Entry, profile: DataFrame, own: DataFrame, reach_m: float) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
-    found = []
-    for border_m in plan.layout.ends_m[:-1]:
-        if walk["start_m"] is None:
-            beyond = own.loc[own["plates_m"] >= border_m, "t_start_s"].tolist()
-        else:
-            there = np.flatnonzero(profile.body_m - walk["start_m"] + reach_m >= border_m)
-            beyond = [float(profile.time_s[there[0]])] if len(there) else []
-        found += beyond[:1]
-    return found
-
-
-def _name_muds(panel: Axes, plan: WalkTrials, edges_s: Sequence[float], begun_s: float) -> None:
-    for (mud, _), start_s, end_s in zip(plan.muds, edges_s, edges_s[1:], strict=False):
-        middle_s = (start_s + end_s) / 2.0 - begun_s
-        panel.annotate(mud_text(mud), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
-
-
-def _draw_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: float) -> None:
-    panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
-        panel.text(0.5, 0.5, "no pose", transform=panel.transAxes, ha="center", color=GREY)
-        return
-    panel.plot(profile.time_s - begun_s, 100.0 * (profile.body_m - walk["start_m"]), color=INK, linewidth=1.2)
-
-
-def _draw_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: float, label: str) -> None:
-    """Draw a force coloured by phase, as in the paper; the line is grey outside of the strokes."""
-    time_s = profile.time_s - begun_s
-    panel.plot(time_s, force_n, color="#bbbbbb", **THIN)
-    for phase, colour, style in (
-        (Phase.INSERTION, "tab:blue", "-"),
-        (Phase.STANCE, "tab:green", "--"),
-        (Phase.EXTRACTION, "tab:orange", "-."),
-    ):
-        stroke_n = np.where(profile.phase == phase, force_n, np.nan)
-        if np.isfinite(stroke_n).any():
-            panel.plot(time_s, stroke_n, style, color=colour, linewidth=1.3, label=phase.name.lower())
-    panel.set_ylabel(label)
-    panel.legend(ncols=3, **LEGEND)
+        times_s, plates_m = own["t_start_s"], own["plates_m"]
+    else:
+        times_s, plates_m = profile["time_s"], profile["body_x_m"] - walk["start_m"] + reach_m
+    beyond_s = (times_s[plates_m >= border_m].head(1).tolist() for border_m in plan.layout.ends_m[:-1])
+    return list(chain.from_iterable(beyond_s))
 
 
 def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: DataFrame, begun_s: float) -> None:
@@ -162,11 +148,9 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
 
 
 def _draw_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
-    profile = profile_from_row(trial["course"])
-    stance = profile.during(Phase.STANCE)
-    time_s = profile.time_s[stance]
-    style = DEPTH_STYLES.get(depth_cm, {"color": INK})
-    panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
+    stance, style = stroke_of(profile_from(trial), Phase.STANCE), DEPTH_STYLES.get(depth_cm, {"color": INK})
+    time_s = stance["time_s"] - stance["time_s"].min()
+    panel.plot(time_s, stance["force_x_n"], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
 
 
 def _draw_bars(panel: Axes, soft: Mapping[str, Any]) -> None:

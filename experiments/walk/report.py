@@ -5,15 +5,13 @@ the soft mud it was half of the load cell's at 5 cm, close to it at 3 cm, and be
 and that this drag was about 2.5 N.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
 import numpy as np
-import pandas
 from pandas import DataFrame
 
 from control.records import Phase
@@ -27,6 +25,7 @@ from experiments.reports.coefficient_table import (
     mud_summaries,
 )
 from experiments.reports.counted_nouns import counted
+from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.text_tables import number
@@ -42,7 +41,7 @@ from experiments.trials.coefficient_page import (
     truth_settings,
 )
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.stride_profile import profile_from_row
+from experiments.trials.stride_profile import profile_from, stroke_of
 from experiments.trials.truth_file import TruthOfMud, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials, soft_name
@@ -85,77 +84,92 @@ FINDINGS = "The paper's findings, and ours by its law below the default method's
 Report = dict[str, Any]  # the summary, as it is in JSON
 
 
+def result_of(
+    plan: WalkTrials,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    truth: TruthOfMud | None,
+    left_out: Mapping[str, Entry],
+    logs: Sequence[Path] = (),
+) -> Result:
+    """Report the walks that count. `truth` of another experiment replaces the bed's."""
+    strides = compared_strides(plan, entries, configuration, truth)
+    report = _report_of(plan, entries, strides, configuration, left_out)
+    report |= truth_settings(plan.identity, configuration, truth, dict.fromkeys([*dict(plan.muds), *plan.soft]))
+    findings = DataFrame(report["beside_paper"]).rename(columns={"what": ""})
+    findings["ours"] = [number(ours, 2) for ours in findings["ours"]]
+    sections = {soft["mud"]: f"Soft mud, {mud_text(soft['mud'])}" for soft in report["soft"] if soft["depths"]}
+    drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
+    texts = {
+        TRACK: _explanation(report, configuration),
+        **dict.fromkeys(list(sections.values())[:1], drag),  # the first one explains what all have in common
+        COMPARISON: METHODS if report["errors"] else "",
+    }
+    return Result(
+        tables=[*coefficient_tables(report, TRACK), Table("findings", FINDINGS, {}, findings, "Findings")],
+        figures=list(_figures(plan, entries, strides, report, sections, reach_of(configuration))),
+        summary=report,
+        title="The walking robot over several muds",
+        texts=texts | remark_texts(report["remarks"], left_out),
+        logs=logs,
+    )
+
+
 def walks_of(plan: WalkTrials, entries: Mapping[str, Entry], group: str = "") -> list[Entry]:
     """Return the walks in a soft mud at one depth, or those over all muds."""
     own = [trial.key for trial in plan.planned if trial.group == (group or plan.planned[0].group)]
     return [entries[key] for key in own if key in entries]
 
 
-def located_strides(
+def compared_strides(
     plan: WalkTrials, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
 ) -> DataFrame:
-    """Return the strides of the walks over all muds, each in its mud.
+    """Return the strides of the walks over all muds, each in its mud, and those in soft muds, named with the depth.
 
-    `truth` of another experiment replaces the bed's.
+    The first stride of a walk in soft mud starts from a standing body and is left out; it has no `plates_m`.
     """
-    rows, layout, reach_m = [], plan.layout, reach_of(configuration)
+    rows, layout, reach_m = list[Row](), plan.layout, reach_of(configuration)
+
+    def add(mud: str, walk: Entry, method: str, stride: Mapping[str, Any], name: str = "", **keys: Any) -> None:
+        known = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
+        rows.extend(compared_rows(stride, known, mud=name or mud, method=method, trial=walk["trial"], **keys))
+
     for walk in walks_of(plan, entries):
         for method, strides in walk["strides"].items():
             for index, stride in enumerate(strides):
-                position_m, start_m = stride["place_m"], walk["start_m"]
-                if position_m is None or start_m is None:
-                    plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
-                else:
-                    plates_m = position_m - start_m + reach_m
+                plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
+                if stride["place_m"] is not None and walk["start_m"] is not None:
+                    plates_m = stride["place_m"] - walk["start_m"] + reach_m
                 mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
-                known = _truth_of(mud, walk, stride, truth)
-                keys = {"mud": mud, "method": method, "trial": walk["trial"], "plates_m": plates_m}
-                rows += compared_rows(stride, known, **keys)
+                add(mud, walk, method, stride, plates_m=plates_m)
+    for group, mud, _ in plan.soft_walks:
+        for walk in walks_of(plan, entries, group):
+            for method, strides in walk["strides"].items():
+                for stride in strides[1:]:
+                    add(mud, walk, method, stride, group)
     return compared_frame(rows)
 
 
-def soft_strides(plan: WalkTrials, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> DataFrame:
-    """Return the strides in soft muds, without the first of each walk, which starts from a standing body."""
-    return compared_frame(
-        row
-        for group, mud, _ in plan.soft_walks
-        for walk in walks_of(plan, entries, group)
-        for method, strides in walk["strides"].items()
-        for stride in strides[1:]
-        for row in compared_rows(stride, _truth_of(mud, walk, stride, truth), mud=group, method=method)
-    )
-
-
-def _truth_of(mud: str, walk: Entry, stride: Mapping[str, Any], truth: TruthOfMud | None) -> Mapping[str, float | None]:
-    if truth:
-        return truth_in(truth, mud)
-    own: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
-    return own
-
-
-def report_of(
+def _report_of(
     plan: WalkTrials,
     entries: Mapping[str, Entry],
+    strides: DataFrame,
     configuration: Configuration,
-    truth: TruthOfMud | None,
     left_out: Mapping[str, Entry],
 ) -> Report:
-    method = configured_method(configuration.estimation)
-    located, soft = located_strides(plan, entries, configuration, truth), soft_strides(plan, entries, truth)
-    certain = located[located["mud"] != ""]
-    uncertain = located[(located["mud"] == "") & (located["method"] == method)]
-    muds = [name for name, _ in plan.muds]
+    method, certain = configured_method(configuration.estimation), strides[strides["mud"] != ""]
+    uncertain = strides[(strides["mud"] == "") & (strides["method"] == method)]
     return {
         "experiment": "walk",
-        "muds": mud_summaries(certain, muds, method, median),
-        "soft": [{"mud": mud, "depths": _soft_depths(plan, entries, mud, soft)} for mud in plan.soft],
-        "errors": error_table(pandas.concat([certain, soft]), "walking"),
-        "beside_paper": _findings(plan, entries, certain, soft),
+        "muds": mud_summaries(certain, dict(plan.muds), method, median),
+        "soft": [{"mud": mud, "depths": _soft_depths(plan, entries, mud, certain)} for mud in plan.soft],
+        "errors": error_table(certain, "walking"),
+        "beside_paper": _findings(plan, entries, certain),
         "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
         "at_a_border": len(_k_s_of(uncertain)),  # strides that belong to no mud
         "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
         "left_out": left_out,
-    } | truth_settings(plan.identity, method, truth, dict.fromkeys([*muds, *plan.soft]))
+    }
 
 
 def _soft_depths(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: DataFrame) -> list[dict[str, Any]]:
@@ -184,31 +198,30 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
     """
     means_n = []
     for walk in walks:
-        profile = profile_from_row(walk["course"])
-        force_n = profile.force_x_n[profile.during(Phase.STANCE)]
-        means_n.append(2.0 * float(np.nanmean(force_n[len(force_n) // 2 :])) if np.isfinite(force_n).any() else np.nan)
-    known = [mean_n for mean_n in means_n if isfinite(mean_n)]
-    return fmean(known) if known else None
+        force_n = stroke_of(profile_from(walk), Phase.STANCE)["force_x_n"].to_numpy()
+        if np.isfinite(force_n).any():
+            means_n.append(2.0 * float(np.nanmean(force_n[len(force_n) // 2 :])))
+    return fmean(means_n) if means_n else None
 
 
-def _findings(
-    plan: WalkTrials, entries: Mapping[str, Entry], certain: DataFrame, soft: DataFrame
-) -> list[dict[str, Any]]:
+def _findings(plan: WalkTrials, entries: Mapping[str, Entry], strides: DataFrame) -> list[dict[str, Any]]:
     """Pair each finding in the paper's text with ours, by its law with a known surface."""
     over = "k_s over the load cell's"
     rows: list[tuple[str, str, float | None]] = [
-        (f"{over}, {mud_text(mud)}", "well below 1", _ratio(certain, mud)) for mud, _ in plan.muds
+        (f"{over}, {mud_text(mud)}", "well below 1", _ratio(strides, mud)) for mud, _ in plan.muds
     ]
     for mud in plan.soft:
         at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
         text_3, text_5 = mud_text(at_3), mud_text(at_5)
-        cell = average_truth(soft[soft["mud"] == at_3], median).get("k_s")  # the paper's load cell measured at 3 cm
+        cell = average_truth(strides[strides["mud"] == at_3], median).get(
+            "k_s"
+        )  # the paper's load cell measured at 3 cm
         thrust_n = _thrust_n(walks_of(plan, entries, at_5))
         rows += [
-            (f"{over} at 3 cm, {text_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
-            (f"{over} at 3 cm, {text_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-            (f"{over} at 3 cm, {text_5}, with drag", "better", _ratio(soft, at_5, KNOWN_COMPENSATED, cell)),
-            (f"{over} at 5 cm, {text_5}", "-", _ratio(soft, at_5)),
+            (f"{over} at 3 cm, {text_3}", "close to 1", _ratio(strides, at_3, cell=cell)),
+            (f"{over} at 3 cm, {text_5}", "0.5", _ratio(strides, at_5, cell=cell)),
+            (f"{over} at 3 cm, {text_5}, with drag", "better", _ratio(strides, at_5, KNOWN_COMPENSATED, cell)),
+            (f"{over} at 5 cm, {text_5}", "-", _ratio(strides, at_5)),
             (f"thrust of both flippers in stance, {text_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
         ]
     return [{"what": what, "paper": paper, "ours": ours} for what, paper, ours in rows]
@@ -224,44 +237,27 @@ def _ratio(strides: DataFrame, mud: str, method: str = KNOWN, cell: float | None
 # the page
 
 
-def result_of(
-    report: Report,
+def _figures(
     plan: WalkTrials,
     entries: Mapping[str, Entry],
-    configuration: Configuration,
-    truth: TruthOfMud | None,
-    logs: Sequence[Path],
-) -> Result:
-    """Return the tables, figures and explanations of all walks."""
-    findings = DataFrame(report["beside_paper"]).rename(columns={"what": ""})
-    findings["ours"] = [number(ours, 2) for ours in findings["ours"]]
-    walked = [soft for soft in report["soft"] if soft["depths"]]
-    drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
-    strides, reach_m = located_strides(plan, entries, configuration, truth), reach_of(configuration)
-    return Result(
-        tables=[*coefficient_tables(report, TRACK), Table("findings", FINDINGS, {}, findings, "Findings")],
-        figures=[
-            *(
-                Figure(
-                    f"figure6_trial{walk['trial']}",
-                    FIGURE_6.format(walk["trial"], plan.flipper),
-                    partial(draw_walk_over, plan, walk, strides, reach_m),
-                    TRACK,
-                )
-                for walk in walks_of(plan, entries)
-            ),
-            *(_soft_figure(soft, plan, entries) for soft in walked),
-        ],
-        summary=report,
-        title="The walking robot over several muds",
-        texts={
-            TRACK: _explanation(report, configuration),
-            **{_soft_section(soft): drag for soft in walked[:1]},  # the first one explains what all have in common
-            COMPARISON: METHODS if report["errors"] else "",
+    strides: DataFrame,
+    report: Report,
+    sections: Mapping[str, str],
+    reach_m: float,
+) -> Iterator[Figure]:
+    located = strides[strides["plates_m"].notna()]
+    for walk in walks_of(plan, entries):
+        draw = partial(draw_walk_over, plan, walk, located, reach_m)
+        yield Figure(f"figure6_trial{walk['trial']}", FIGURE_6.format(walk["trial"], plan.flipper), draw, TRACK)
+    for soft in report["soft"]:
+        own = {
+            100.0 * depth_m: walks_of(plan, entries, name)
+            for name, mud, depth_m in plan.soft_walks
+            if mud == soft["mud"]
         }
-        | remark_texts(report["remarks"], report["left_out"]),
-        logs=logs,
-    )
+        if soft["depths"]:
+            draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in own.items() if made})
+            yield Figure(f"figure7_{file_name(soft['mud'])}", FIGURE_7, draw, sections[soft["mud"]])
 
 
 def _explanation(report: Report, configuration: Configuration) -> str:
@@ -278,15 +274,3 @@ def _explanation(report: Report, configuration: Configuration) -> str:
         )
     paragraphs += [TRIALS, *error_paragraphs(settings), TRUTHS[settings["truth"]]]
     return "\n\n".join([*paragraphs, report["missing_truth"]])
-
-
-def _soft_section(soft: Mapping[str, Any]) -> str:
-    return f"Soft mud, {mud_text(soft['mud'])}"
-
-
-def _soft_figure(soft: Mapping[str, Any], plan: WalkTrials, entries: Mapping[str, Entry]) -> Figure:
-    own = {
-        100.0 * depth_m: walks_of(plan, entries, name) for name, mud, depth_m in plan.soft_walks if mud == soft["mud"]
-    }
-    draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in own.items() if made})
-    return Figure(f"figure7_{file_name(soft['mud'])}", FIGURE_7, draw, _soft_section(soft))

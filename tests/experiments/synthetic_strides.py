@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from math import radians
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pandas import DataFrame
 
 from control.modes import Mode
 from control.records import Phase, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.trials.stride_profile import StrideProfile
+from experiments.trials.stride_profile import COLUMNS, OF_FLIPPER
 from experiments.trials.trial import Trial, replay_trial
 from logs.files.log_reader import Log
 from logs.files.tick_array import tick_type
@@ -44,20 +44,17 @@ def make_stride(**others: Any) -> dict[str, Any]:
     return {name: make_estimate() for name in ("k_p", "k_s", "k_e")} | {"index": 0, "surface_m": 0.0} | others
 
 
-def make_profile(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: list[float]) -> StrideProfile:
+def make_profile(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: Any) -> DataFrame:
     """Return a profile whose adduction angles put the edge at each depth."""
-    count = len(depths_m)
-    sweeps_rad = [radians(sweep_deg) for sweep_deg in sweeps_deg]
-    columns: dict[str, Any] = {name: np.zeros(count) for name in StrideProfile._fields} | {
-        "time_s": 0.01 * np.arange(count),
-        "phase": np.full(count, int(phase)),
-        "sweep_rad": np.array(sweeps_rad),
-        "adduction_rad": np.array(
-            [GEOMETRY.adduction_rad(s, d) for s, d in zip(sweeps_rad, depths_m, strict=True)],
-        ),
-        "depth_m": np.array(depths_m),
+    sweeps_rad = np.radians(sweeps_deg)
+    columns = dict.fromkeys((*COLUMNS[3:], *OF_FLIPPER), 0.0) | {
+        "time_s": 0.01 * np.arange(len(depths_m)),
+        "phase": phase,
+        "sweep_rad": sweeps_rad,
+        "adduction_rad": [GEOMETRY.adduction_rad(s, d) for s, d in zip(sweeps_rad, depths_m, strict=True)],
+        "depth_m": depths_m,
     }
-    return StrideProfile(**(columns | {name: np.array(values) for name, values in others.items()}))
+    return DataFrame(columns | others)
 
 
 def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:

@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.records import Phase, Rig
+from control.records import TWO_FLIPPERS, Phase, Rig
 from estimation.estimation_parameters import Method
 from experiments.flipper.measurement import measure, require_bench, require_mud
-from experiments.flipper.report import Report, report_of, result_of, trials_by_mud
+from experiments.flipper.report import Report, result_of, trials_by_mud
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.bench_robot import leave
+from experiments.robot.bench_robot import BenchRobot, leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.studies.flipper import bench_configuration, flipper_bench
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.result import Result
 from experiments.trials.coefficient_page import COMPARISON
 from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.simulated_bed import CarriedBed
-from experiments.trials.stride_profile import profile_from_row
+from experiments.trials.stride_profile import profile_from
 from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
 
@@ -39,43 +39,42 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
     operator = ScriptedOperator()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        robot, bed = flipper_bench(folder, [MUD], 1)
-        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SETTINGS))
+        bench = bench_in(folder, operator)
+        disarm_in_first_insertion(bench.robot)
         conduct_trials(bench, [TRIAL], partial(measure, bench, "right", 0.03, 1), lambda done, of: None)
         leave(bench.robot, bench.operator, folder)
     return bench.notebook.entries, operator.asked
 
 
-class FaultyOnce:
-    """A bed on which the first trial fails: the robot is disarmed in its insertion."""
-
-    def __init__(self, robot: LockstepRobot, bed: CarriedBed) -> None:
-        self._bed = bed
-        self._robot = robot
-        self.truths = bed.truths
-        self._wait, self._invalid = robot.wait, False
-
-    def prepare(self, trial: PlannedTrial) -> str:
-        if not self._invalid:
-            self._robot.wait = self._fail_in_insertion  # type: ignore[method-assign]
-        return self._bed.prepare(trial)
-
-    def _fail_in_insertion(self, duration_s: float) -> None:
-        self._wait(duration_s)
-        if not self._invalid and self._robot.call("status")["phase"] == "insertion":
-            self._invalid = True
-            self._robot.call("disarm")
+def bench_in(folder: Path, operator: ScriptedOperator | None = None, rig: Rig = TWO_FLIPPERS) -> Bench:
+    return flipper_bench(operator or ScriptedOperator(), Notebook(folder, SETTINGS), [MUD], rig)
 
 
-def report(
+def disarm_in_first_insertion(robot: BenchRobot) -> None:
+    wait = robot.wait
+
+    def fail(duration_s: float) -> None:
+        wait(duration_s)
+        if robot.call("status")["phase"] == "insertion":
+            robot.wait = wait  # type: ignore[method-assign]
+            robot.call("disarm")
+
+    robot.wait = fail  # type: ignore[method-assign]
+
+
+def reported(
     entries: dict[str, Entry] | None = None,
     muds: tuple[str, ...] = (MUD,),
     truth: dict[str, dict[str, float]] | None = None,
     method: Method = "default",
-) -> Report:
+) -> Result:
     configuration = bench_configuration()
     configuration = replace(configuration, estimation=replace(configuration.estimation, method=method))
-    return report_of(SETTINGS, trials_by_mud(muds, entries or measured()[0]), configuration, truth, {})
+    return result_of(SETTINGS, trials_by_mud(muds, entries or measured()[0]), configuration, truth, {})
+
+
+def report(*arguments: Any, **options: Any) -> Report:
+    return dict(reported(*arguments, **options).summary)
 
 
 # the required configuration
@@ -94,7 +93,7 @@ def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
 def test_a_stroke_through_air_is_invalid_and_one_with_a_force_is_not() -> None:
     for phase, name in ((Phase.INSERTION, "force_z_n"), (Phase.STANCE, "force_x_n")):
         require_mud(make_profile(phase, [0.0] * 9, [0.01] * 9, **{name: [0.0] * 6 + [0.4] * 3}))
-    noise_n = list(np.tile([0.3, -0.3], 9))
+    noise_n = np.tile([0.3, -0.3], 9)
     with pytest.raises(InvalidTrialError, match="met no mud"):
         require_mud(make_profile(Phase.INSERTION, [0.0] * 18, [0.01] * 18, force_z_n=noise_n))
 
@@ -118,10 +117,9 @@ class SlidingRobot(LockstepRobot):
 
 
 def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> None:
-    robot, bed = flipper_bench(tmp_path, [MUD], 1)
-    robot.__class__ = SlidingRobot
-    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SETTINGS))
-    bed.prepare(TRIAL)
+    bench = bench_in(tmp_path)
+    bench.robot.__class__ = SlidingRobot
+    bench.prepare(TRIAL)
     with pytest.raises(InvalidTrialError, match="the base moved by .* mm") as invalid:
         measure(bench, "right", 0.03, 1, TRIAL)
     assert invalid.value.entry is not None and invalid.value.entry["remarks"] == []
@@ -147,18 +145,16 @@ def test_the_daemons_strides_count_and_the_papers_method_is_next_to_them() -> No
 
 def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
-    reported = report(truth=truth)
-    assert reported["muds"][0]["truth"] == truth[MUD]
-    assert {row["coefficient"] for row in reported["errors"]} == {"k_p"}
+    found = report(truth=truth)
+    assert found["muds"][0]["truth"] == truth[MUD]
+    assert {row["coefficient"] for row in found["errors"]} == {"k_p"}
 
 
 def test_the_recorded_profile_is_a_whole_stride_with_three_pauses() -> None:
-    profile = profile_from_row(next(iter(measured()[0].values()))["course"])
-    assert profile.time_s[-1] == pytest.approx(12.4, abs=0.3)
-    assert {Phase(int(phase)) for phase in profile.phase} == {
-        Phase.INSERTION, Phase.PAUSE, Phase.STANCE, Phase.EXTRACTION, Phase.SWING
-    }  # fmt: skip
-    assert profile.depth_command_m.max() == pytest.approx(0.03)
+    profile = profile_from(next(iter(measured()[0].values())))
+    assert profile["time_s"].max() == pytest.approx(12.4, abs=0.3)
+    assert {*profile["phase"]} == {Phase.INSERTION, Phase.PAUSE, Phase.STANCE, Phase.EXTRACTION, Phase.SWING}
+    assert profile["depth_command_m"].max() == pytest.approx(0.03)
 
 
 def test_the_law_follows_the_force_in_steady_stance() -> None:
@@ -202,35 +198,37 @@ def test_muds_that_were_measured_before_stay_in_the_report() -> None:
 def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     entries = entries_of(w47_6=[2e6])
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
-    reported = report(entries, ("47.6",))
-    assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
-    assert reported["muds"][0]["k_p"].value == 2e6
+    found = report(entries, ("47.6",))
+    assert found["later_strokes"]["k_p"] == pytest.approx([0.8])
+    assert found["muds"][0]["k_p"].value == 2e6
 
 
 def test_without_a_load_cell_there_are_no_errors() -> None:
     entries = entries_of(w47_6=[2e6])
-    reported = report(entries, ("47.6",))
-    assert reported["errors"] == []
-    result = result_of(reported, trials_by_mud(("47.6",), entries), bench_configuration(), [])
-    assert not result.texts[COMPARISON] and [table.name for table in result.tables] == ["muds", "forces"]
-    assert result.tables[-1].cells()[1][:2] == ["47.6 %", f"2.00 ({reported['misfit_n']['47.6']['insertion']:.2f})"]
+    result = reported(entries, ("47.6",))
+    misfit_n = result.summary["misfit_n"]["47.6"]["insertion"]
+    assert (
+        result.summary["errors"] == []
+        and not result.texts[COMPARISON]
+        and [table.name for table in result.tables] == ["muds", "forces"]
+    )
+    assert result.tables[-1].cells()[1][:2] == ["47.6 %", f"2.00 ({misfit_n:.2f})"]
     assert all(figure.draw().axes for figure in result.figures)
 
 
 def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
-    reported = report(method="paper")
+    found = report(method="paper")
     (entry,) = measured()[0].values()
-    assert reported["muds"][0]["k_p"].trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
-    assert reported["settings"]["method"] == "paper"
-    assert (reported["misfit_n"][MUD]["insertion"] or 0.0) > 0.0
+    assert found["muds"][0]["k_p"].trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
+    assert found["settings"]["method"] == "paper"
+    assert (found["misfit_n"][MUD]["insertion"] or 0.0) > 0.0
 
 
 def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
     """Like this rig, the paper's own bench has one flipper (section II-C)."""
-    robot, bed = flipper_bench(tmp_path, [MUD], 1, Rig(("right",)))
-    assert robot.configuration.rig.joints == ("right_sweep", "right_adduction")
-    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SETTINGS))
-    bed.prepare(TRIAL)
+    bench = bench_in(tmp_path, rig=Rig(("right",)))
+    assert bench.robot.configuration.rig.joints == ("right_sweep", "right_adduction")
+    bench.prepare(TRIAL)
     entry = measure(bench, "right", 0.03, 1, TRIAL)
     (stride,) = entry["strides"][DEFAULT]
     (truth,) = entry["truths"].values()

@@ -24,7 +24,7 @@ from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.robot.bench_errors import BenchError
 from experiments.trials.coefficient_page import truth_settings
 from experiments.trials.truth_file import load_truth, truth_in
-from tests.experiments.synthetic_strides import make_estimate, make_stride
+from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 
 
 def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
@@ -122,7 +122,7 @@ def test_a_mud_is_found_however_its_name_is_written(tmp_path: Path) -> None:
     assert truth_in(truth, "48.6") == truth_in(truth, "w = 48.600 %") == {"k_p": 1e6}
     assert truth_in(truth, "pond") == {"k_p": 2e6}
     assert truth_in(truth, "48.61") == {}
-    missing = truth_settings({}, "default", truth, ["48.6", "pond", "48.61"])["missing_truth"]
+    missing = truth_settings({}, CONFIGURATION, truth, ["48.6", "pond", "48.61"])["missing_truth"]
     assert "48.61 %" in missing and "pond" not in missing
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from pandas import DataFrame
 
-from control.records import Estimate
-from experiments.reports.error_table import Row, evaluation_of
+from experiments.reports.error_table import Row
 from experiments.reports.error_table import error_rows as rows_of_frame
 from experiments.reports.error_table import plate_rows as plates_of_frame
 
@@ -24,8 +23,9 @@ def evaluated(
     mud: str = "49.5",
     **changes: Any,
 ) -> Row:
-    estimate = Estimate(value, std_error, 10, **({"valid": True} | changes))
-    return evaluation_of(setup, mud, coefficient, method, estimate, truth, upright)
+    names = {"setup": setup, "mud": mud, "coefficient": coefficient, "method": method, "trial": "", "kind": "value"}
+    numbers = {"value": value, "std_error": std_error, "repeatability": nan, "truth": truth, "upright": upright}
+    return names | numbers | changes
 
 
 def error_rows(evaluations: list[Row]) -> list[Row]:
@@ -36,8 +36,8 @@ def plate_rows(evaluations: list[Row]) -> list[Row]:
     return plates_of_frame(DataFrame(evaluations))
 
 
-def bound(value: float, std_error: float = 0.0, **changes: Any) -> Row:
-    return evaluated(value, std_error, at_least=True, reason="it held", **changes)
+def bound(value: float, std_error: float = 0.0, kind: str = "bound") -> Row:
+    return evaluated(value, std_error, kind=kind)
 
 
 def only(rows: list[Row]) -> Row:
@@ -62,7 +62,7 @@ def test_bounds_have_no_error_and_are_counted_apart() -> None:
     row = only(error_rows([evaluated(110.0), bound(50.0), bound(90.0), bound(130.0)]))
     assert (row["median"], row["strides"], row["bounds"]) == (0.1, 1, 3)
     assert (row["bounds_hold"], row["bound_over_truth"]) == (0.6667, 0.9)
-    row = only(error_rows([bound(50.0), bound(50.0, valid=False)]))
+    row = only(error_rows([bound(50.0), bound(50.0, kind="not valid")]))
     assert (row["median"], row["p95"], row["bias"], row["coverage"], row["strides"]) == (None, None, None, None, 0)
     assert (row["bounds"], row["not_valid"]) == (1, 1)
 
@@ -130,6 +130,5 @@ def test_the_scatter_of_a_trials_strides_is_compared_with_the_claim_and_its_bias
     for trial in range(30):
         level = 1e6 * np.exp(0.2 * random.standard_normal())
         for value in (level * np.exp(0.05 * random.standard_normal(5))).tolist():
-            estimate = Estimate(value, 0.2 * value, 10, True, repeatability=claimed * value)
-            rows.append(evaluation_of("single", "50", "k_s", "default", estimate, 1e6, 1e6, str(trial)))
+            rows.append(evaluated(value, truth=1e6, repeatability=claimed * value, trial=str(trial)))
     assert only(error_rows(rows))["chi"] == pytest.approx(0.05 / claimed, rel=0.15)

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pandas import DataFrame
 
-from control.records import Estimate
-from experiments.reports.error_table import COEFFICIENTS, error_rows, evaluation_of
+from experiments.reports.coefficient_table import compared_frame, compared_rows
+from experiments.reports.error_table import COEFFICIENTS, error_rows
 from experiments.studies import estimation
 from experiments.studies.estimation import (
     LATENCY,
@@ -23,11 +23,13 @@ from experiments.studies.estimation import (
     study,
 )
 from experiments.study.option import OptionError
+from experiments.trials.estimation_methods import configured_method
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import NONE
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
+from tests.experiments.synthetic_strides import make_estimate, make_stride
 
 STRONG = clay_of_water(47.6)
 MUDS = [["47.6", STRONG.strength_pa]]
@@ -37,11 +39,8 @@ def synthetic(setup: str, muds: Any, **row: Any) -> dict[str, Any]:
     """Return one estimate that is 10 % too large, or a transition that was followed at once."""
     if len(muds) > 1:
         return {"evaluated": [], "transitions": [{"before": "a", "after": "b", "flipper": "left", "strides": 1}]}
-    estimate = Estimate(1.1e6, 1e5, 10, True)
-    return {
-        "evaluated": [evaluation_of(setup, muds[0][0], "k_p", "default", estimate, 1e6, 0.8e6)],
-        "transitions": [],
-    }
+    stride, keys = make_stride(k_p=make_estimate(1.1e6)), {"setup": setup, "mud": muds[0][0], "method": "default"}
+    return {"evaluated": compared_rows(stride, {"k_p": 1e6}, {"k_p": 0.8e6}, **keys)[:1], "transitions": []}
 
 
 # the trials
@@ -85,17 +84,14 @@ def test_wrong_muds_and_layers_are_refused() -> None:
 
 def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
     single, walking = (
-        [(each.name, each.setup, each.with_pose, each.parameters.method) for each in methods_of(setup)]
+        [(*names.values(), with_pose, configured_method(own)) for names, with_pose, own in methods_of(setup)]
         for setup in (SINGLE, WALKING)
     )
-    assert single == [("default", "single flipper", True, "default"), ("paper", "single flipper", True, "paper")]
+    assert single == [("single flipper", name, True, name) for name in ("default", "paper")]
     assert walking == [
-        ("default", "walking", True, "default"),
-        ("paper", "walking", True, "paper"),
-        ("paper compensated", "walking", True, "paper"),
-        ("default", "walking without pose", False, "default"),
+        *(("walking", name, True, name) for name in ("default", "paper", "paper compensated")),
+        ("walking without pose", "default", False, "default"),
     ]
-    assert [each.parameters.paper.compensation for each in methods_of(WALKING)] == [False, False, True, False]
 
 
 @pytest.mark.parametrize(
@@ -126,7 +122,9 @@ def test_rows_torque_constants_and_times_are_disturbed_as_asked(
 def parts() -> dict[str, DataFrame]:
     """Simulate two trials of a single flipper and of a short walk: a trial draws one latency and torque constant."""
     return {
-        setup: DataFrame([row for seed in (1, 2) for row in run_part(setup, MUDS, strides, seed, LAYERS)["evaluated"]])
+        setup: compared_frame(
+            row for seed in (1, 2) for row in run_part(setup, MUDS, strides, seed, LAYERS)["evaluated"]
+        )
         for setup, strides in (("single", 1), ("walking", 2))
     }
 
@@ -151,7 +149,7 @@ def test_the_measuring_walk_finds_k_e_where_the_quick_one_finds_too_little() -> 
     """Without disturbances, in mud of 49.5 %: right after a stance an extraction pulls less."""
     muds = [[*clay_of_water(49.5)[:2]]]
     for setup, low, high in (("walking", -1.0, -0.08), ("measuring", -0.06, 0.06)):
-        rows = error_rows(DataFrame(run_part(setup, muds, 2, 1, ())["evaluated"]))
+        rows = error_rows(compared_frame(run_part(setup, muds, 2, 1, ())["evaluated"]))
         (bias,) = [
             row["bias"]
             for row in rows

@@ -40,10 +40,14 @@ COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud aft
 def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
     segments = [(length_m, MUDS[name]) for name, length_m in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
     track = Track(segments * COPIES)
-    robot, bed = simulated_bench(
-        folder, simulated_configuration(), track, 1, lambda trial, prepared: prepared * track.length_m / COPIES, capture
+    return simulated_bench(
+        ScriptedOperator(*answers),
+        Notebook(folder, {}),
+        simulated_configuration(),
+        track,
+        lambda trial, prepared: prepared * track.length_m / COPIES,
+        capture,
     )
-    return Bench(robot, bed, ScriptedOperator(*answers), Notebook(folder, {}))
 
 
 def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """Samples get the requested latency between current and angle, and no other change."""
 
-from functools import cache
 from math import cos, sin
 from statistics import fmean
 
@@ -9,10 +8,6 @@ import pytest
 from control.rate import PERIOD_S
 from control.records import BodyPose, DriveState, Phase, same_for_all
 from experiments.trials.latency import Sample, with_latency
-from experiments.trials.trial import WALKING, Trial, run_trial
-from simulation.mud.clay import clay_of_water
-from simulation.mud.disturbances import NONE
-from simulation.mud.track import Track
 
 RATE_RAD_S = 3.0
 
@@ -57,8 +52,3 @@ def test_late_signals_have_the_time_of_their_arrival_and_the_others_stay(
         stamp = late[-1]
         assert now[stamp] == pytest.approx(was[stamp])
         assert after[number][:2] == before[number][:2]
-
-
-@cache
-def trial(latency_s: float) -> Trial:
-    return run_trial(WALKING, Track([(5.0, clay_of_water(47.6))]), NONE, 1, 1, latency_s=latency_s)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +21,10 @@ from experiments.trials.mud_trials import (
     Bench,
     InvalidTrialError,
     PlannedTrial,
-    PromptedBed,
-    Truths,
     conduct_trials,
     counted_entries,
     open_bench,
+    prepare_by_hand,
 )
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
@@ -53,29 +54,22 @@ class AskedRobot(StillRobot):
         return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
 
 
-class ScriptedBed:
-    def __init__(self, *answers: str) -> None:
-        self.answers = list(answers)
+class Session:
+    """Owns a bench of scripted parts; its measurements give the listed outcomes."""
+
+    def __init__(self, folder: Path, operator: ScriptedOperator | None = None, answers: Sequence[str] = ()) -> None:
+        """`answers` are those of the operator who prepares the mud."""
+        self.robot, self.operator, self.answers = AskedRobot(), operator or ScriptedOperator(), list(answers)
+        self.notebook = Notebook(folder, PLAN)
+        self.bench = Bench(self.robot, self.operator, self.notebook, self.prepare)
         self.prepared: list[str] = []
+        self.measured: list[str] = []
+        self.outcomes: list[Entry | BaseException] = []
+        self.shown: list[tuple[int, int]] = []
 
     def prepare(self, trial: PlannedTrial) -> str:
         self.prepared.append(trial.key)
         return self.answers.pop(0) if self.answers else GO_ON
-
-    def truths(self, flipper: str) -> Truths:
-        return {}
-
-
-class Session:
-    """Owns a bench of scripted parts; its measurements give the listed outcomes."""
-
-    def __init__(self, folder: Path, operator: ScriptedOperator | None = None, bed: ScriptedBed | None = None) -> None:
-        self.robot, self.operator, self.bed = AskedRobot(), operator or ScriptedOperator(), bed or ScriptedBed()
-        self.notebook = Notebook(folder, PLAN)
-        self.bench = Bench(self.robot, self.bed, self.operator, self.notebook)
-        self.measured: list[str] = []
-        self.outcomes: list[Entry | BaseException] = []
-        self.shown: list[tuple[int, int]] = []
 
     def measure(self, trial: PlannedTrial) -> Entry:
         self.measured.append(trial.key)
@@ -94,7 +88,7 @@ ALL = [trial.key for trial in TRIALS]
 
 def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
     session = Session(tmp_path).conduct()
-    assert session.bed.prepared == session.measured == list(session.notebook.entries) == ALL
+    assert session.prepared == session.measured == list(session.notebook.entries) == ALL
     assert session.shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
     assert session.robot.called.count("disarm") == len(TRIALS)
 
@@ -105,18 +99,18 @@ def test_an_interrupted_experiment_continues(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         first.conduct()
     second = Session(tmp_path).conduct()
-    assert second.bed.prepared == second.measured == ALL[1:]
+    assert second.prepared == second.measured == ALL[1:]
 
 
 def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, bed=ScriptedBed(GO_ON, SKIP)).conduct()
+    session = Session(tmp_path, answers=(GO_ON, SKIP)).conduct()
     assert list(counted_entries(session.notebook)) == [ALL[0], ALL[2]]
     again = Session(tmp_path).conduct()
-    assert again.bed.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
+    assert again.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
 
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, bed=ScriptedBed(GO_ON, REDO)).conduct()
+    session = Session(tmp_path, answers=(GO_ON, REDO)).conduct()
     assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
     assert session.notebook.entries[ALL[0]]["count"] == 2
 
@@ -126,23 +120,20 @@ def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path)
     session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
     session.conduct()
     assert session.operator.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
-    assert session.bed.prepared == session.measured == [ALL[0], *ALL]
+    assert session.prepared == session.measured == [ALL[0], *ALL]
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
 def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path, answer: str) -> None:
     robot, operator = AskedRobot(), ScriptedOperator(answer)
     robot.blocked = True
-    bed = PromptedBed(robot, operator, lambda trial: "Level it")
+    prepare = partial(prepare_by_hand, robot, operator, lambda trial: "Level it", TRIALS[0])
     if answer == CLEAR:
-        assert bed.prepare(TRIALS[0]) == GO_ON
+        assert prepare() == GO_ON
     else:
-        with pytest.raises(EndedError, match="then 'mudskipper clear' and the same command again"):
-            bed.prepare(TRIALS[0])
-    assert operator.asked[0] == (
-        "A fault keeps the torque off:\n  A drive is silent. (for 2 min)\n    -> check it\n"
-        "Torque stays off until this is cleared."
-    )
+        with pytest.raises(EndedError, match="mudskipper clear"):
+            prepare()
+    assert "A drive is silent. (for 2 min)\n    -> check it" in operator.asked[0]
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
 
@@ -203,7 +194,7 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -
 
 def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
-        counted_entries(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)
+        counted_entries(Session(tmp_path, answers=(SKIP, SKIP, SKIP)).conduct().notebook)
 
 
 class DaemonsRobot(AskedRobot):

@@ -37,7 +37,7 @@ def errors_of(geometry: FlipperGeometry) -> dict[str, list[float]]:
     errors: dict[str, list[float]] = {name: [] for name in COEFFICIENTS}
     for stride in strides_of(trial, METHOD):
         for name in COEFFICIENTS:
-            estimate, truth = getattr(stride, name), getattr(truths[stride.flipper], name)
+            estimate, truth = getattr(stride, name), truths[stride.flipper][name]
             assert estimate.valid and not estimate.at_least
             errors[name].append(estimate.value / truth - 1.0)
     return errors

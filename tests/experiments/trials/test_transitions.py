@@ -1,6 +1,6 @@
 """In synthetic walks over borders the transitions and the strides until the estimate has followed are counted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,7 +11,6 @@ from pandas import DataFrame
 import experiments.trials.transitions
 from control.mud_estimate import FlipperEstimate, MudEstimate
 from control.records import FLIPPERS
-from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
 from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import SINGLE, Trial, configuration_of
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
@@ -78,12 +77,7 @@ class Walk:
         replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, self.depth_m)) for i, k_p in enumerate(self.estimates)]
         monkeypatch.setattr(experiments.trials.transitions, "replay_trial", lambda trial, parameters: replayed)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
-        return transitions_of(trial, self.cells(truths))
-
-    def cells(self, truths: Sequence[StrideTruth]) -> Mapping[tuple[str, int], LoadCellTruth]:
-        leaning = {name: TrueCoefficients(k_p, 1.0, 1.0) for name, k_p in K_P.items()}
-        wrong = TrueCoefficients(1.0, 1.0, 1.0)  # the upright plate must not matter
-        return {(truth.flipper, truth.index): LoadCellTruth(leaning[truth.clay.name], wrong) for truth in truths}
+        return transitions_of(trial, {(truth.flipper, truth.index): {"k_p": K_P[truth.clay.name]} for truth in truths})
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,9 @@ from experiments.study.notebook import Entry, Notebook
 from experiments.trials.coefficient_page import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, conduct_trials
-from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.walk.measurement import MUDS, Advance, WalkTrials, measure, require_mud
-from experiments.walk.report import Report, located_strides, report_of, result_of, walks_of
+from experiments.walk.measurement import MUDS, WalkTrials, measure, monitor_advance, require_mud
+from experiments.walk.report import Report, compared_strides, result_of, walks_of
 from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
@@ -40,11 +39,11 @@ def measured() -> dict[str, Entry]:
 
 
 def bench_of(folder: Path, plan: WalkTrials) -> Bench:
-    return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.identity))
+    return walking_bench(ScriptedOperator(), plan, Notebook(folder, plan.identity))
 
 
 def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
-    return report_of(plan, measured(), CONFIGURATION, truth, {})
+    return result_of(plan, measured(), CONFIGURATION, truth, {}).summary
 
 
 # the plan
@@ -91,7 +90,7 @@ def test_every_walk_is_in_the_notebook_with_all_methods() -> None:
 
 def located() -> DataFrame:
     """Return a row for each stride by the default method."""
-    strides = located_strides(SHORT, measured(), CONFIGURATION, None)
+    strides = compared_strides(SHORT, measured(), CONFIGURATION, None).dropna(subset="plates_m")
     return strides[(strides["method"] == DEFAULT) & (strides["coefficient"] == "k_s")]
 
 
@@ -154,8 +153,7 @@ def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
-    reported = report()
-    result = result_of(reported, SHORT, measured(), CONFIGURATION, None, [])
+    result = result_of(SHORT, measured(), CONFIGURATION, None, {})
     assert result.json()["experiment"] == "walk"
     assert [figure.name for figure in result.figures] == ["figure6_trial1", "figure7_51.2"]
     assert [table.name for table in result.tables] == ["muds", "errors", "findings"]
@@ -182,7 +180,6 @@ class BlindRobot(LockstepRobot):
 def blind(folder: Path, from_s: float) -> Bench:
     bench = bench_of(folder, TINY)
     robot = bench.robot
-    assert isinstance(robot, LockstepRobot) and isinstance(bench.bed, CarriedBed)
     robot.__class__ = BlindRobot
     assert isinstance(robot, BlindRobot)
     robot.blind_from_s = from_s
@@ -192,11 +189,11 @@ def blind(folder: Path, from_s: float) -> Bench:
 def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(tmp_path: Path) -> None:
     """The muds are 20 cm long and steps at most 12 cm; strides are assigned to muds by their order."""
     bench = blind(tmp_path, 0.0)
-    bench.bed.prepare(TINY.planned[0])
+    bench.prepare(TINY.planned[0])
     entry = measure(bench, TINY, TINY.planned[0])
     assert [remark for remark in entry["remarks"] if "no pose arrives" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
-    reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None, {})
+    reported = result_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None, {}).summary
     assert reported["without_pose"] == 1
     assert len(reported["muds"][0]["k_p"].trials) == 2
 
@@ -214,7 +211,7 @@ class StoppedRobot(LockstepRobot):
 def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path) -> None:
     bench = bench_of(tmp_path, TINY)
     bench.robot.__class__ = StoppedRobot
-    bench.bed.prepare(TINY.planned[0])
+    bench.prepare(TINY.planned[0])
     with pytest.raises(InvalidTrialError, match="stopped by another client in stride 2") as invalid:
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
     assert invalid.value.entry is not None and len(invalid.value.entry["strides"][DEFAULT]) == 1
@@ -223,14 +220,14 @@ def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path) -> None:
 def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> None:
     plan = replace(SHORT, muds=(("a", 0.2), ("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
-    spread = located_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
+    spread = compared_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
     assert spread["mud"].tolist() == [mud for mud in ("a", "b", "b", "b") for _ in COEFFICIENTS]
     assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
 
 
 def test_a_pose_that_is_lost_during_a_walk_makes_it_invalid(tmp_path: Path) -> None:
     bench = blind(tmp_path, 4.0)
-    bench.bed.prepare(TINY.planned[0])
+    bench.prepare(TINY.planned[0])
     with pytest.raises(InvalidTrialError, match="pose of the body is lost"):
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
 
@@ -240,8 +237,8 @@ def test_a_pose_that_is_lost_during_a_walk_makes_it_invalid(tmp_path: Path) -> N
 
 def evaluate_walk(*statuses: tuple[float, float | None, str]) -> list[str | None]:
     """Evaluate the statuses of a walk over 50 cm that began at 1 m."""
-    advance = Advance(1.0, 0.5, 0.0)
-    return [advance.evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in statuses]
+    evaluate = monitor_advance(1.0, 0.5, 0.0)
+    return [evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in statuses]
 
 
 def test_a_walk_ends_with_the_insertion_past_the_last_mud() -> None:
