@@ -43,7 +43,7 @@ def bench_of(folder: Path, plan: WalkTrials) -> Bench:
 
 
 def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
-    return result_of(plan, measured(), CONFIGURATION, truth, {}).summary
+    return dict(result_of(plan, measured(), CONFIGURATION, truth, {}).summary)
 
 
 # the plan
