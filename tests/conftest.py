@@ -17,8 +17,9 @@ from tests.folders import EXAMPLE_CONFIGURATION
 from tests.recorded_walks import record_walks
 from tests.running_bench import Bench, SharedBench, running_bench
 
-# No deadline, as the machine may be busy; the same examples for each commit; `--hypothesis-profile search` tries more.
+# No deadline, as the machine may be busy; the same examples for each commit; `--hypothesis-profile` chooses others.
 settings.register_profile("search", deadline=None)
+settings.register_profile("long", deadline=None, max_examples=10_000)
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 

@@ -79,14 +79,6 @@ def evaluated(report: Report, bar: str, reached: bool) -> Report:
     return report | {"reached": reached, "verdict": f"{bar}: {'reached' if reached else 'not reached'}"}
 
 
-def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
-    """Return median, p99 and maximum in microseconds; zeros where nothing was measured."""
-    ordered = sorted(durations_s) or [0.0]
-    last = len(ordered) - 1
-    fractions = {"median": 0.50, "p99": 0.99, "max": 1.0}
-    return {name: round(1e6 * ordered[round(fraction * last)], 2) for name, fraction in fractions.items()}
-
-
 def show_progress(done: float, total: float, what: str) -> None:
     """Write one line on a terminal's stderr, and nothing anywhere else."""
     if sys.stderr.isatty():

@@ -134,16 +134,40 @@ def _read_count(packet: bytes, offset: int) -> tuple[int, int]:
     return count, offset + INTEGER.size
 
 
+Parts = tuple["int | str | Parts", ...]  # of an item: so many bytes, NAME, or a count of items with these parts
+NAME = "name"  # a text that ends with a zero byte
+MARKER_SETS: Parts = (NAME, (VECTOR_BYTES,))
+OTHER_MARKERS: Parts = (VECTOR_BYTES,)
+CHANNELS: Parts = (INTEGER.size, ((CHANNEL_VALUE_BYTES,),))  # of force plates or of devices
+
+
+def _skip_items(packet: bytes, offset: int, parts: Parts) -> int:
+    """Return the end of a count of items with these parts."""
+    count, offset = _read_count(packet, offset)
+    if parts and all(isinstance(part, int) for part in parts):
+        return offset + count * sum(part for part in parts if isinstance(part, int))
+    for _ in range(count):
+        for part in parts:
+            if isinstance(part, int):
+                offset += part
+            elif isinstance(part, str):
+                offset = packet.index(0, offset) + 1
+            else:
+                offset = _skip_items(packet, offset, part)
+    return offset
+
+
 class FrameLayout:
     """The layout of one version's frames."""
 
     def __init__(self, version: NatNetVersion) -> None:
-        self.has_sizes = version >= (4, 1)
-        self.has_force_plates = version >= (2, 9)
-        self.has_devices = version >= (2, 11)
-        self.has_ticks = version >= (3, 0)
-        self.bodies_have_markers = not self.has_ticks
-        self.labelled_bytes = 26 if version >= (3, 0) else 22
+        self.has_sizes, self.has_ticks = version >= (4, 1), version >= (3, 0)
+        self._markers_of_body: list[Parts] = [] if self.has_ticks else [(MARKER_BYTES,)]
+        body: Parts = (POSE.size, *self._markers_of_body, QUALITY.size)
+        self._after_bodies: list[Parts] = [(INTEGER.size, body), (26 if self.has_ticks else 22,)]
+        self._after_bodies += [CHANNELS] * ((version >= (2, 9)) + (version >= (2, 11)))
+        if self.has_sizes:
+            self._after_bodies.append(())  # the assets
         software = "d" if version >= (2, 7) else "f"
         ticks = "QQQ" if self.has_ticks else ""
         precision = "II" if self.has_sizes else ""
@@ -152,10 +176,12 @@ class FrameLayout:
     @_decoding()
     def decode_frame(self, packet: bytes, identity: int) -> MotionFrame:
         """Decode a frame with the rigid body of that streaming id; 0: the first. Raises MalformedPacketError."""
-        offset = self._skip_marker_sets(packet, HEADER.size + INTEGER.size)
-        count, offset = self._begin_section(packet, offset)
-        body, offset = self._find_body(packet, offset + VECTOR_BYTES * count, identity)
-        end = self.end.unpack_from(packet, self._skip_to_end(packet, offset))
+        offset = self._skip_section(packet, HEADER.size + INTEGER.size, MARKER_SETS)
+        offset = self._skip_section(packet, offset, OTHER_MARKERS)
+        body, offset = self._find_body(packet, offset, identity)
+        for parts in self._after_bodies:
+            offset = self._skip_section(packet, offset, parts)
+        end = self.end.unpack_from(packet, offset)
         if not isfinite(end[2]):
             raise MalformedPacketError("a time that is not finite")
         exposed, sent = (end[3], end[5]) if self.has_ticks else (0, 0)
@@ -167,81 +193,29 @@ class FrameLayout:
             models_changed=bool(end[-1] & MODELS_CHANGED),
         )
 
-    def _begin_section(self, packet: bytes, offset: int) -> tuple[int, int]:
-        """Return the number of items in a section, and where the first one begins."""
-        count, offset = _read_count(packet, offset)
-        return count, offset + INTEGER.size * self.has_sizes
-
-    def _skip(self, packet: bytes, offset: int) -> int:
-        """Return the end of a section that contains its size."""
-        count, size = TWO_INTEGERS.unpack_from(packet, offset)
-        if count < 0 or size < 0:
-            raise MalformedPacketError("a negative size")
-        return offset + TWO_INTEGERS.size + int(size)
-
-    def _skip_marker_sets(self, packet: bytes, offset: int) -> int:
-        if self.has_sizes:
-            return self._skip(packet, offset)
-        count, offset = self._begin_section(packet, offset)
-        for _ in range(count):
-            offset = packet.index(0, offset) + 1
-            markers, offset = self._begin_section(packet, offset)
-            offset += VECTOR_BYTES * markers
-        return offset
+    def _skip_section(self, packet: bytes, offset: int, parts: Parts) -> int:
+        if not self.has_sizes:
+            return _skip_items(packet, offset, parts)
+        _, offset = _read_count(packet, offset)
+        size, offset = _read_count(packet, offset)
+        return offset + size
 
     def _find_body(self, packet: bytes, offset: int, identity: int) -> tuple[RigidBody | None, int]:
         """Return the requested body, and the end of the section."""
-        count, offset = self._begin_section(packet, offset)
+        count, offset = _read_count(packet, offset)
+        offset += INTEGER.size * self.has_sizes
         found = None
         for _ in range(count):
             numbers = POSE.unpack_from(packet, offset)  # every item, so that a wrong count ends with the packet
-            offset = self._skip_markers(packet, offset + POSE.size)
+            offset += POSE.size
+            for parts in self._markers_of_body:
+                offset = _skip_items(packet, offset, parts)
             _, flags = QUALITY.unpack_from(packet, offset)
+            offset += QUALITY.size
             if found is None and identity in (0, numbers[0]):
                 tracked = bool(flags & TRACKED) and isfinite(sum(numbers[1:4]))
                 found = RigidBody(numbers[0], numbers[1:4], numbers[4:], tracked)
-            offset += QUALITY.size
         return found, offset
-
-    def _skip_markers(self, packet: bytes, offset: int) -> int:
-        if not self.bodies_have_markers:
-            return offset
-        markers, offset = self._begin_section(packet, offset)
-        return offset + MARKER_BYTES * markers
-
-    def _skip_to_end(self, packet: bytes, offset: int) -> int:
-        """Skip skeletons, assets, labelled markers, force plates and devices."""
-        if self.has_sizes:
-            for _ in range(5):
-                offset = self._skip(packet, offset)
-            return offset
-        offset = self._skip_skeletons(packet, offset)
-        count, offset = self._begin_section(packet, offset)
-        offset += self.labelled_bytes * count
-        for _ in range(self.has_force_plates + self.has_devices):
-            offset = self._skip_channels(packet, offset)
-        return offset
-
-    def _skip_skeletons(self, packet: bytes, offset: int) -> int:
-        count, offset = self._begin_section(packet, offset)
-        for _ in range(count):
-            bones, offset = self._begin_section(packet, offset + INTEGER.size)
-            if self.bodies_have_markers:
-                for _ in range(bones):
-                    offset = self._skip_markers(packet, offset + POSE.size) + QUALITY.size
-            else:
-                offset += (POSE.size + QUALITY.size) * bones
-        return offset
-
-    def _skip_channels(self, packet: bytes, offset: int) -> int:
-        """Skip the channels of force plates or of devices."""
-        count, offset = self._begin_section(packet, offset)
-        for _ in range(count):
-            channels, offset = self._begin_section(packet, offset + INTEGER.size)
-            for _ in range(channels):
-                values, offset = self._begin_section(packet, offset)
-                offset += CHANNEL_VALUE_BYTES * values
-        return offset
 
 
 @_decoding()
@@ -265,13 +239,13 @@ def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
 def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:
     """Return the end of a description that does not contain its size."""
     offset = packet.index(0, offset) + 1
-    if kind == RIGID_BODY:
-        offset += TWO_INTEGERS.size + VECTOR_BYTES
-        if version < (3, 0):
-            return offset
+    if kind == MARKER_SET:
+        return _skip_items(packet, offset, (NAME,))
+    offset += TWO_INTEGERS.size + VECTOR_BYTES
+    if version < (3, 0):
+        return offset
     markers, offset = _read_count(packet, offset)
-    if kind == RIGID_BODY:
-        offset += (VECTOR_BYTES + INTEGER.size) * markers
-    for _ in range(markers if kind == MARKER_SET or version >= (4, 0) else 0):
+    offset += (VECTOR_BYTES + INTEGER.size) * markers
+    for _ in range(markers if version >= (4, 0) else 0):
         offset = packet.index(0, offset) + 1
     return offset

@@ -22,7 +22,6 @@ from drivers.odrive.codec import (
     arbitration_id,
 )
 from firmware_host.configuration.configuration import Configuration
-from simulation.devices.foreign_master import ForeignMaster
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -56,30 +55,6 @@ def walking(armed: Lockstep) -> Lockstep:
     robot.walk(WalkOrder(0.03, adaptive=False))
     robot.run_for(1.0)
     return robot
-
-
-@pytest.mark.parametrize(("torque_nm", "every"), [(0.0, 1), (1.0, 10)])
-def test_torque_of_another_program_on_the_bus_idles_the_drives_in_two_ticks(
-    armed: Lockstep, torque_nm: float, every: int
-) -> None:
-    robot = copy_of(armed)
-    robot.robot.foreign_masters.append(ForeignMaster(robot.robot.drives[1], torque_nm, every))
-    robot.run_for((every + 2) * robot.period_s)
-    assert "foreign_commands" in present(robot)
-    assert robot.loop.mode is Mode.FAULT
-    robot.run_for(0.2)
-    assert not any(state.closed_loop for state in robot.loop.states)
-    assert robot.loop.request(Request.ARM, robot.now_s)
-
-
-@pytest.mark.parametrize(("every", "longest_ticks"), [(1, 10), (10, 90)])
-def test_torque_of_a_program_that_is_not_heard_idles_the_drives(
-    walking: Lockstep, every: int, longest_ticks: int
-) -> None:
-    robot = copy_of(walking)
-    robot.robot.foreign_masters.append(ForeignMaster(robot.robot.drives[1], 1.0, every, heard=False))
-    assert robot.run_until(lambda: robot.loop.mode not in ENERGISED, longest_ticks * robot.period_s)
-    assert "setpoint_mismatch" in present(robot)
 
 
 @pytest.mark.parametrize("kind", ["slow", "intermittent"])

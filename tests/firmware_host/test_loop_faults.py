@@ -15,8 +15,8 @@ import pytest
 
 from control.controller import SOFT_STOP_S, WalkOrder
 from control.fault_causes import group_by_cause
-from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
-from control.modes import ENERGISED, Mode, Request
+from control.faults import Clears, FaultKind, Reaction
+from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from control.records import JOINTS, Phase
 from drivers.fault_injection.failure_table import BY_NAME
@@ -205,18 +205,6 @@ def test_a_drive_may_say_that_the_power_is_cut(configuration: Configuration) -> 
     after_release(robot)
 
 
-def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copied) -> None:
-    robot = at("idle")
-    assert robot.loop.request(Request.ARM, robot.now_s) is None
-    robot.step()
-    assert mode_of(robot) is Mode.ARMING
-    fail(robot, "drive_silent", "right_sweep")
-    for _ in range(FaultKind.DRIVE_SILENT.bound_ticks):
-        robot.step()
-        assert robot.loop.sent.torques_nm == NO_TORQUE
-    assert mode_of(robot) is Mode.FAULT
-
-
 @pytest.mark.parametrize("stage", STAGES)
 def test_damping_never_speeds_a_joint_up(at: Copied, stage: str) -> None:
     """This holds from the third tick on, because the slew limit needs two to end the previous torque."""
@@ -273,16 +261,6 @@ def test_a_soft_stop_ends_in_time_even_if_the_mud_holds_the_flippers(at: Copied)
     assert robot.robot.plant.angles_rad[1] < -UP_RAD
 
 
-def test_a_worse_fault_in_a_soft_stop_takes_effect_at_once(at: Copied) -> None:
-    robot = at("stance")
-    fail(robot, "voltage_under")
-    robot.run_for(0.2)
-    assert mode_of(robot) is Mode.STOPPING
-    fail(robot, "drive_silent", "left_sweep")
-    robot.run_for(FaultKind.DRIVE_SILENT.bound_ticks * PERIOD_S)
-    assert mode_of(robot) is Mode.FAULT
-
-
 def test_a_fault_that_ends_with_its_cause_does_not_arm_the_robot_again(at: Copied) -> None:
     robot = at("holding")
     low = fail(robot, "voltage_under")
@@ -314,34 +292,6 @@ def test_a_fault_that_must_be_cleared_stays_until_then_even_against_force(at: Co
     robot.run_for(0.5)
     assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.present
     assert sum(text.startswith(f"fault {name} ") for text in robot.recorder.texts) == 1
-
-
-def test_a_clear_does_not_apply_to_faults_after_the_next_arming(at: Copied) -> None:
-    robot = at("idle")
-    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
-    robot.step()
-    cleared_s = robot.now_s
-    assert robot.loop.request(Request.ARM, robot.now_s) is None
-    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 0.3)
-    fail(robot, "encoder_jump")
-    ticks_until(robot, "encoder_jump", 5)
-    assert robot.now_s - cleared_s < 0.4
-    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
-    robot.run_for(1.0)
-    assert mode_of(robot) is Mode.FAULT
-
-
-def test_a_bug_stays_a_fault_until_a_restart(at: Copied) -> None:
-    robot = at("holding")
-    bug = fail(robot, "torque_not_finite")
-    robot.run_for(0.02)
-    end(bug)
-    assert mode_of(robot) is Mode.FAULT
-    for _ in range(3):
-        robot.loop.request(Request.CLEAR, robot.now_s)
-        robot.run_for(0.6)
-    assert mode_of(robot) is Mode.FAULT
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
 
 
 # force
@@ -421,17 +371,6 @@ def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
     assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
     assert not robot.loop.forced
-    assert not any("despite" in text for text in robot.recorder.texts)
-
-
-@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "motor_hot", "current_stale", "joint_position"])
-def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
-    robot = at("idle")
-    fail(robot, name)
-    ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
-    robot.run_for(0.1)
-    assert mode_of(robot) is Mode.IDLE
     assert not any("despite" in text for text in robot.recorder.texts)
 
 
@@ -518,15 +457,3 @@ def test_a_lease_that_is_lost_right_after_an_arm_request_prevents_arming(at: Cop
     robot.step()
     assert mode_of(robot) is Mode.IDLE
     assert FaultKind.LEASE_LOST.fault(holder="alice") in robot.loop.faults.present
-
-
-def test_disarm_works_during_every_kind_of_fault(at: Copied) -> None:
-    for name in ("voltage_under", "bus_refuses", "current_stale"):
-        robot = at("stance")
-        fail(robot, name)
-        ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
-        assert mode_of(robot) in ENERGISED
-        assert robot.loop.request(Request.DISARM, robot.now_s) is None
-        robot.step()
-        assert mode_of(robot) in (Mode.IDLE, Mode.FAULT)
-        assert robot.loop.sent.torques_nm == NO_TORQUE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import random
 import subprocess
 import sys
 import tracemalloc
@@ -25,7 +24,6 @@ from logs.files.log_reader import read_log
 from logs.recovery import recover_all, recover_log, salvage_rows
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.waiting import LONGEST_S
-from verification.stress.corrupted_logs import corrupt, make_sound_log, try_log
 
 CHUNK = 100  # ticks
 
@@ -228,20 +226,6 @@ def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
     contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
     path.write_bytes(contents)
     assert recover_log(path).note == f"recovered: {4 * CHUNK} rows, {CHUNK} lost in damaged places"
-
-
-@pytest.mark.parametrize("finished", [True, False])
-def test_corrupted_logs_cost_no_row_that_is_still_there(tmp_path: Path, finished: bool) -> None:
-    """The long version is `python -m verification.stress.corrupted_logs`."""
-    chance = random.Random(7)
-    (tmp_path / ACTIVE).mkdir()
-    sound = make_sound_log(tmp_path / "sound.mcap", chance, finished)
-    wrong = []
-    for number in range(150):
-        contents, first, how = corrupt(sound, chance)
-        _, complaint = try_log(tmp_path / ACTIVE / f"{number}.mcap", sound, contents, first)
-        wrong += [f"{number} {how}: {complaint}"] * bool(complaint)
-    assert wrong == []
 
 
 def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ and `sleeping` lets them sleep between ticks, for the daemon by `stay_awake = fa
 import ctypes
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,6 @@ from verification.local_robot import LONGEST_WAIT_S, LocalRobot
 BAR_RATIO = 2.0
 TURN_S = 5.0
 TIMER_ABSTIME = 1
-JOINED: dict[str, Callable[[list[float]], float]] = {"p50": median, "p99": median, "max": max}  # over the turns
 
 
 class Timespec(ctypes.Structure):
@@ -72,11 +71,11 @@ def time_daemon(robot: LocalRobot, seconds: float, rate_hz: float) -> Report:
 
 def summary_of(turns: Sequence[Report]) -> Report:
     ticks, missed = (sum(turn[name] for turn in turns) for name in ("ticks", "missed_ticks"))
-    durations = {
-        name: {fraction: join([turn[name][fraction] for turn in turns]) for fraction, join in JOINED.items()}
+    medians_us = {
+        name: {part: median(turn[name][part] for turn in turns) for part in ("p50", "p99")}
         for name in ("wake_late_us", "tick_us")
     }
-    return {"ticks": ticks, "missed_ticks": missed, "missed_fraction": missed / max(1, ticks + missed)} | durations
+    return {"ticks": ticks, "missed_ticks": missed, "missed_fraction": missed / max(1, ticks + missed)} | medians_us
 
 
 @contextmanager

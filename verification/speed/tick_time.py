@@ -7,7 +7,7 @@ ticks marked at the beginning of every stage.
 
 `ratios` hardly depend on the computer. `hot_to_bare_sockets` divides a whole tick by the time in which bare sockets
 read and send its frames; cold ticks and the longest ticks at the ends of insertions and strides are divided by a whole
-tick. All are medians, but for the longest tick of all. `--against FOLDER` compares with another working tree: both
+tick. All are medians. `--against FOLDER` compares with another working tree: both
 measure their whole tick over the mock bus in turns, as processes of their own. `--picture FILE` draws the medians of
 the stages; it needs matplotlib.
 """
@@ -56,7 +56,6 @@ def measure_bus(bus: str, seconds: int, folder: Path, drive: str) -> Report:
             "hot_to_bare_sockets": round(whole_us / report["bare_sockets_us"]["median"], 2),
             "cold_to_hot": round(report["cold_us"]["median"] / whole_us, 2),
             "ends_to_hot": round(report["longest_us"]["median"] / whole_us, 2) if ends else None,
-            "longest_to_hot": round(report["whole_us"]["max"] / whole_us, 2),
         }
     }
 
@@ -79,16 +78,16 @@ def compare_trees(other: Path, pairs: int) -> Report:
     return {"pairs": pairs, "medians_us": medians_us} | paired_ratio(found["this tree"], found["other tree"])
 
 
-def plot_parts(stages_us: Mapping[str, Mapping[str, float]], path: Path) -> None:
-    """Draw a bar for each kind of bus; `stages_us` are medians by bus and stage."""
+def plot_parts(stages_us: Mapping[str, Mapping[str, Mapping[str, float]]], path: Path) -> None:
+    """Draw a bar for each kind of bus, of the medians of its stages."""
     from matplotlib.figure import Figure  # slow to import
 
     figure = Figure(figsize=(8.0, 0.9 + 0.5 * len(stages_us)), layout="constrained")
     panel = figure.add_subplot()
     for bus, own_us in reversed(list(stages_us.items())):
-        left, whole_us = 0.0, sum(own_us.values())
+        left, whole_us = 0.0, sum(each["median"] for each in own_us.values())
         for part, (stages, colour) in PARTS.items():
-            fraction = sum(own_us[stage] for stage in stages) / whole_us
+            fraction = sum(own_us[stage]["median"] for stage in stages) / whole_us
             bar = panel.barh(bus, fraction, left=left, color=colour)
             panel.bar_label(bar, [f"{part}\n{fraction:.0%}"], label_type="center", size=7, color="white")
             left += fraction
@@ -117,11 +116,7 @@ def measure(
         return evaluated(report, "no slower than the other tree", report["ratio"] <= 1.0 + (report["std_error"] or 0.0))
     measured = {each: measure_bus(each, seconds, folder, drive) for each in ([bus] if bus else BUSES)}
     if picture:
-        stages_us = {
-            name: {stage: summary["median"] for stage, summary in each["stages_us"].items()}
-            for name, each in measured.items()
-        }
-        plot_parts(stages_us, Path(picture))
+        plot_parts({name: each["stages_us"] for name, each in measured.items()}, Path(picture))
     worst = max(each["ratios"]["hot_to_bare_sockets"] for each in measured.values())
     report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_to_bare_sockets": BAR_TO_BARE_SOCKETS}
     bar = f"a hot tick at most {BAR_TO_BARE_SOCKETS:g} times bare sockets"

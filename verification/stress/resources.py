@@ -1,7 +1,6 @@
 """The resources of a process, as the kernel counts them: resident memory, descriptors, threads, children."""
 
 import os
-import resource
 from pathlib import Path
 
 PAGE_KIB = os.sysconf("SC_PAGE_SIZE") / 1024.0
@@ -9,11 +8,6 @@ PAGE_KIB = os.sysconf("SC_PAGE_SIZE") / 1024.0
 
 def resident_kib(process: int | str = "self") -> float:
     return PAGE_KIB * int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
-
-
-def peak_kib() -> float:
-    """Return the largest resident memory that this process ever had."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def descriptors(process: int | str = "self") -> int:

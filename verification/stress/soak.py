@@ -1,9 +1,9 @@
 """An hour of operation without growth: the loop, its status socket and a real recorder, in accelerated lockstep.
 
 The robot walks over a long sequence of muds. A random operator arms, walks, stops, disarms and clears through the
-socket; other clients ask and leave, some at once and some without reading; parts of the robot fail at random times. As
-in the daemon no garbage is collected. The simulated robot and the clients are in the same process, so their memory
-counts too. Rows reach the recorder as fast as its pipe takes them, many times faster than on a robot.
+socket, asks and leaves, sometimes at once or without reading; parts of the robot fail at random times. As in the daemon
+no garbage is collected. The simulated robot and the clients are in the same process, so their memory counts too. Rows
+reach the recorder as fast as its pipe takes them, many times faster than on a robot.
 
 After the warm-up (the loop keeps its last 200 strides, Python its free lists, each up to a bound) resident memory must
 not grow by more than the bar, every descriptor and thread must be released, the logs must stay within quota plus the
@@ -13,16 +13,16 @@ allocations; a collection at the end counts the cyclic garbage.
 
 import gc
 import select
+import socket
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
 import msgpack
-import numpy as np
 
 from control.modes import Mode
 from control.rate import RATE_HZ
@@ -35,7 +35,6 @@ from firmware_host.log.recorder import LogReport, Recorder
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.status_socket import StatusSocket
 from firmware_host.sockets.user_groups import load_rights
-from logs.files.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
 from simulation.mud.track import Track
@@ -43,7 +42,7 @@ from simulation.mud.unevenness import RandomStrength
 from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
 from verification.stress.resources import descriptors, resident_kib, threads
-from verification.stress.stream_client import StreamClient
+from verification.stress.written_rows import count_rows
 
 BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.2  # of the readings
@@ -52,50 +51,20 @@ CALL_TICKS = 190  # between two calls of the operator
 BY_HAND_TICKS = 1900  # between two checks for joints out of their range
 FAILURE_S = 15.0  # between two failures, on average
 SEGMENTS, SEGMENT_M = 100, 3.0
-PATIENCE_TICKS = 200  # of a client that waits for an answer
-SILENT_FRACTION, HURRIED_FRACTION = 0.1, 0.05  # of the clients: never read, leave before the answer
+STAY_TICKS = (0, 50, 50, 50, 200)  # of a client
+SILENT_FRACTION = 0.1  # of the clients never read
 READINGS = 30
 ROOM_MS = 20_000  # that the writer may take to empty its pipe
 QUESTIONS = ("status", "strides", "map", "check", "hello", "failures")
 DEPTHS_M = (0.02, 0.03, 0.04, 0.05)
 UNHARMED = "log"  # its failures lose rows on purpose
+Call = tuple[str, dict[str, Any]]
 
 
-class Call(NamedTuple):
-    method: str
-    params: dict[str, Any]
-
-
-class RandomOperator:
-    """Owns the random numbers; the same seed gives the same calls."""
-
-    def __init__(self, buses: Sequence[str], seed: int) -> None:
-        self.chance = Random(seed)
-        table = Failures(buses).table()
-        self._failures = [(component, str(kind)) for component, kind, _ in table if component != UNHARMED]
-
-    def question(self) -> Call:
-        method = self.chance.choice(QUESTIONS)
-        return Call(method, {"since": self.chance.randrange(1000)} if method == "strides" else {})
-
-    def failure(self) -> Call:
-        component, kind = self.chance.choice(self._failures)
-        for_s = round(self.chance.choice((0.02, 0.1, 0.5, 1.0)) * self.chance.uniform(0.5, 1.5), 3)
-        return Call("fail", {"component": component, "kind": kind, "for_s": for_s})
-
-    def next_call(self, mode: str, blocked: bool) -> Call:
-        """Return the next call that makes sense in this mode, or a question."""
-        draw = self.chance.random()
-        if mode in ("fault", "damping") or (mode == "idle" and blocked):
-            return Call("clear", {})
-        if mode == "idle":
-            return Call("arm", {})
-        if mode in ("hold", "walking") and draw < 0.05:
-            return Call("stop" if mode == "walking" and draw < 0.03 else "disarm", {})
-        if mode != "hold":
-            return self.question()
-        depth = {"depth_m": self.chance.choice(DEPTHS_M)} if self.chance.random() < 0.3 else {}
-        return Call("walk", {"strides": self.chance.choice((0, 0, 0, 1, 5))} | depth)
+class Visitor(NamedTuple):
+    connection: socket.socket
+    last_tick: int
+    reads: bool
 
 
 class PatientRecorder(Recorder):
@@ -117,17 +86,17 @@ class PatientRecorder(Recorder):
 
 
 class SoakedLoop:
-    """Owns robot, socket and recorder, and the counts."""
+    """Owns robot, socket and recorder, the operator's visits, and the counts. A seed always gives the same calls."""
 
     def __init__(self, folder: Path, seed: int) -> None:
         configuration = replace(load_example(), log=LOG)
-        self.operator = RandomOperator(list(configuration.bus), seed)
-        self.chance = self.operator.chance
+        self.chance = Random(seed)
         self.logs = folder / "logs"
         run = new_run_id("soak")
         metadata = {"robot": "soak", "run_id": run}
         self.recorder = PatientRecorder(first_path(self.logs, run), configuration.text, metadata, LOG)
         failures = Failures(configuration.bus, seed)
+        self._failures = [(name, str(kind)) for name, kind, _ in failures.table() if name != UNHARMED]
         self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
         calls = OperatorCalls(self.robot.loop, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
@@ -136,11 +105,11 @@ class SoakedLoop:
         )
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
-        self.visitors: list[tuple[StreamClient, int, int]] = []  # with the number of its calls and its last tick
+        self.visitors: list[Visitor] = []
         self.asked: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.mode_ticks: Counter[str] = Counter()
-        self.ticks = self.visits = self.refused = self.moved_by_hand = 0
+        self.ticks = self.moved_by_hand = 0
 
     def _now_s(self) -> float:
         return self.robot.now_s
@@ -152,7 +121,7 @@ class SoakedLoop:
         return track
 
     def run_for(self, seconds: float) -> None:
-        """Run with operator, visitors and failures, and then until no client is connected."""
+        """Run with operator and failures, and then until no client is connected."""
         for _ in range(round(seconds * RATE_HZ)):
             self._step()
             self._invite()
@@ -166,36 +135,54 @@ class SoakedLoop:
         self.ticks += 1
         self.mode_ticks[loop.mode.name.lower()] += 1
         self.faults.update(fault.name for fault in loop.faults.begun)
-        self.visitors = [visitor for visitor in self.visitors if not self._is_gone(*visitor)]
-
-    def _is_gone(self, client: StreamClient, calls: int, last_tick: int) -> bool:
-        client.step()
-        gone = client.closed or len(client.answers) >= calls or self.ticks >= last_tick
-        if gone:
-            self.refused += sum(problem is not None for problem in client.answers.values())
-            client.close()
-        return gone
+        for visitor in [each for each in self.visitors if self.ticks >= each.last_tick]:
+            with suppress(BlockingIOError):
+                if visitor.reads:
+                    visitor.connection.recv(1 << 20)
+            visitor.connection.close()
+            self.visitors.remove(visitor)
 
     def _invite(self) -> None:
-        """Let the operator and failures come at their times, and resets joints that a fault moved out of range."""
+        """Let the operator and failures come at their times, and reset joints that a fault moved out of range."""
         loop = self.robot.loop
         if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
             for arm in self.robot.robot.plant.arms:
                 arm.reset()
             self.moved_by_hand += 1
         if self.ticks % CALL_TICKS == 0:
-            self._visit(self.operator.next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
+            self._visit(self._next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
         if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
-            self._visit(self.operator.failure())
+            component, kind = self.chance.choice(self._failures)
+            for_s = round(self.chance.choice((0.02, 0.1, 0.5, 1.0)) * self.chance.uniform(0.5, 1.5), 3)
+            self._visit(("fail", {"component": component, "kind": kind, "for_s": for_s}))
+
+    def _next_call(self, mode: str, blocked: bool) -> Call:
+        """Return the next call that makes sense in this mode, or a question."""
+        draw = self.chance.random()
+        if mode in ("fault", "damping") or (mode == "idle" and blocked):
+            return "clear", {}
+        if mode == "idle":
+            return "arm", {}
+        if mode in ("hold", "walking") and draw < 0.05:
+            return "stop" if mode == "walking" and draw < 0.03 else "disarm", {}
+        if mode != "hold":
+            return self._question()
+        depth = {"depth_m": self.chance.choice(DEPTHS_M)} if self.chance.random() < 0.3 else {}
+        return "walk", {"strides": self.chance.choice((0, 0, 0, 1, 5))} | depth
+
+    def _question(self) -> Call:
+        method = self.chance.choice(QUESTIONS)
+        return method, {"since": self.chance.randrange(1000)} if method == "strides" else {}
 
     def _visit(self, call: Call) -> None:
-        calls = [call, *(self.operator.question() for _ in range(self.chance.randrange(3)))]
-        data = b"".join(msgpack.packb([0, number, *each]) for number, each in enumerate(calls))
-        hurried, silent = self.chance.random() < HURRIED_FRACTION, self.chance.random() < SILENT_FRACTION
-        client = StreamClient(self.socket.path, [data], hurried, reads=not silent)
-        self.visitors.append((client, len(calls), self.ticks + PATIENCE_TICKS))
-        self.visits += 1
-        self.asked.update(each.method for each in calls)
+        calls = [call, *(self._question() for _ in range(self.chance.randrange(3)))]
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        connection.connect(str(self.socket.path))
+        connection.setblocking(False)
+        connection.sendall(b"".join(msgpack.packb([0, number, *each]) for number, each in enumerate(calls)))
+        last_tick, reads = self.ticks + self.chance.choice(STAY_TICKS), self.chance.random() >= SILENT_FRACTION
+        self.visitors.append(Visitor(connection, last_tick, reads))
+        self.asked.update(method for method, _ in calls)
 
     def reading(self) -> dict[str, float]:
         writer = self.recorder.writer_pid
@@ -216,18 +203,12 @@ class SoakedLoop:
             "strides": loop.learning.strides_closed,
             "walked_m": round(self.robot.robot.plant.body_m, 2),
             "moved_by_hand": self.moved_by_hand,
-            "visits": self.visits,
             "asked": dict(self.asked),
-            "refused": self.refused,
             "faults": dict(self.faults),
             "modes_s": {mode: round(ticks / RATE_HZ, 1) for mode, ticks in self.mode_ticks.items()},
             "bugs": self.bugs[:10],
             "dropped": self.recorder.dropped,
         }
-
-    def close(self) -> None:
-        self.socket.close()
-        self.recorder.close(60.0)
 
 
 def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
@@ -242,8 +223,9 @@ def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
         if soaked.robot.loop.mode is Mode.BOOT:
             raise RuntimeError("the drives were never heard")
     finally:
-        soaked.close()
-    return report | rows_of(soaked.logs)
+        soaked.socket.close()
+        soaked.recorder.close(60.0)
+    return report | count_rows(soaked.logs)
 
 
 def count_garbage() -> dict[str, Any]:
@@ -254,19 +236,6 @@ def count_garbage() -> dict[str, Any]:
     gc.set_debug(0)
     gc.garbage.clear()
     return {"objects": sum(kinds.values()), "kinds": dict(kinds.most_common(6))}
-
-
-def rows_of(logs: Path) -> dict[str, Any]:
-    """Count the rows in the files that the quota preserved: ticks are numbered, and count the missed ones."""
-    read = [read_log(path) for path in log_files(logs, ACTIVE, DONE)]
-    ticks = np.concatenate([log.ticks[["tick", "missed_ticks"]] for log in read])
-    numbers = ticks["tick"].astype(np.int64) - ticks["missed_ticks"].astype(np.int64)
-    return {
-        "files": len(read),
-        "files_not_whole": sum(not log.complete for log in read),
-        "ticks_in_files": len(ticks),
-        "ticks_missing": int(np.abs(np.diff(numbers) - 1).sum()),
-    }
 
 
 def measure(folder: Path, *, hours: float = 1.0, seed: int = 1) -> dict[str, Any]:

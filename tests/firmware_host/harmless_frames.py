@@ -4,7 +4,9 @@ These lists are stated here again, and not taken from the transmit gate's tables
 what only an operator's command would send is missing too.
 """
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit import codec as mit
@@ -13,6 +15,8 @@ from drivers.moteus.codec import Mode, command_id
 from drivers.moteus.registers import Register
 from drivers.odrive import codec as odrive
 from drivers.odrive05 import codec as odrive05
+from firmware_host.ticker import Tick
+from simulation.harness.lockstep import Lockstep
 
 ZERO_TORQUES = (bytes(4), bytes.fromhex("00000080"))
 LEAVE = bytes.fromhex("fffffffffffffffd")
@@ -86,3 +90,26 @@ HARMLESS: Mapping[str, Callable[[Frame], bool]] = {
     "moteus": _for_moteus,
     "mit": _for_mit,
 }
+
+
+class Observer:
+    """Owns a third node on each bus of a robot, by which frames come in, and those of the loop are seen."""
+
+    def __init__(self, robot: Lockstep) -> None:
+        self._robot = robot
+        self._nodes = [bus.open() for bus in robot.buses.values()]
+
+    def tick(self, arriving: Sequence[Frame] = (), with_drives: bool = True) -> list[Frame]:
+        """Run a tick in which these frames arrive; return those that the loop sends."""
+        robot = self._robot
+        for index, frame in enumerate(arriving):
+            self._nodes[index % len(self._nodes)].send(frame)
+        robot.tick_number += 1
+        if with_drives:
+            robot.robot.advance(robot.now_s)
+        self._receive()
+        robot.loop.tick(Tick(robot.now_s, 0.0, robot.tick_number, 0))
+        return self._receive()
+
+    def _receive(self) -> list[Frame]:
+        return [frame for node in self._nodes for frame in node.receive()]

@@ -1,0 +1,142 @@
+"""Malformed and unexpected CAN frames raise nothing, and let no frame leave that could move a drive.
+
+An example is what arrives in one tick: frames of simulated drives with other bytes, lengths, ids or marks, random
+frames, or bursts of one frame, as a babbling node sends. Each goes to a robot in boot, where the frames of one drive
+never come, and to one that is idle, among the true messages of its drives.
+"""
+
+from __future__ import annotations
+
+from struct import pack
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from control.modes import Mode
+from drivers.can.frames import DATA_MAX_BYTES, EXTENDED_MASK, STANDARD_MASK, Frame
+from drivers.drive import FD, DriveParameters
+from drivers.drive_types import type_of
+from drivers.mit import codec as mit
+from drivers.moteus import codec as moteus
+from drivers.moteus import registers, settings
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+from tests.firmware_host.harmless_frames import Observer, is_harmless
+from verification.example_robot import load_example
+
+TRACK = Track([(1.0, MUDS["48.5"])])
+FD_BYTES = 64  # of the longest CAN FD frame
+RECORDED_TICKS = 400  # from the start on, in which the drives' settings are read
+BABBLE_FRAMES = 400
+NUMBERS = [pack("<f", number) for number in (float("nan"), float("inf"), -0.0, 1e38, -3.4e38, 1e-45, 0.5)]
+STAMPS_S = [0.0, 1e9, -1.0, float("nan")]
+
+
+def waiting_robot(drive: str, mode: Mode) -> Lockstep:
+    """Make a robot that stays in this mode; in boot its drives are disconnected."""
+    robot = Lockstep(load_example(drive), TRACK)
+    if mode is Mode.BOOT:
+        for bus in robot.buses.values():
+            bus.ports[0].close()
+    else:
+        assert robot.run_until(lambda: robot.loop.mode is mode, 2.0)
+    return robot
+
+
+def true_frames(drive: str) -> list[Frame]:
+    """Return frames of simulated drives from start to idle, one of each id and length."""
+    robot = Lockstep(load_example(drive), TRACK)
+    nodes = [bus.open() for bus in robot.buses.values()]
+    robot.run_for(RECORDED_TICKS * robot.period_s)
+    frames = [frame for node in nodes for frame in node.receive()]
+    return list({(frame.arbitration_id, len(frame.data)): frame for frame in frames}.values())
+
+
+def announces(frame: Frame, drive: DriveParameters) -> bool:
+    """Return whether the loop may take a frame for this drive's heartbeat, or its answer."""
+    content = type_of(drive).read_frame(frame)
+    identifier = frame.arbitration_id | FD * frame.is_fd
+    return identifier in type_of(drive).identifiers(drive) and (content is None or "heartbeat" in content.signals)
+
+
+def malformed_frames(true: list[Frame]) -> st.SearchStrategy[Frame]:
+    longest = FD_BYTES if true[0].is_fd else DATA_MAX_BYTES
+
+    def changed(frame: Frame, at: int, data: bytes, size: int) -> Frame:
+        return frame._replace(data=(frame.data[:at] + data + frame.data[at + len(data) :])[:size])
+
+    sizes, payloads = st.integers(0, longest), st.binary(max_size=longest)
+    ids = st.sampled_from([frame.arbitration_id for frame in true]) | st.integers(0, STANDARD_MASK)
+    marks = [st.booleans()] * 3
+    return st.one_of(
+        st.builds(changed, st.sampled_from(true), sizes, payloads | st.sampled_from(NUMBERS), st.just(longest) | sizes),
+        st.builds(lambda frame, other: frame._replace(arbitration_id=other), st.sampled_from(true), ids),
+        st.builds(
+            Frame,
+            ids | st.integers(0, EXTENDED_MASK),
+            payloads,
+            *marks,
+            st.sampled_from(STAMPS_S),
+            st.just(true[0].is_fd),
+        ),
+    )
+
+
+@pytest.mark.parametrize("drive", ["odrive", "odrive05", "moteus", "mit", "mit:AK80-9"])
+def test_malformed_frames_move_no_drive(drive: str) -> None:
+    modes = (Mode.BOOT, Mode.IDLE)
+    robots = [waiting_robot(drive, mode) for mode in modes]
+    observers = [Observer(robot) for robot in robots]
+    silent = next(iter(robots[0].loop.configuration.drive.values()))
+    frames = malformed_frames(true_frames(drive)).filter(lambda frame: not announces(frame, silent))
+    count = 0
+
+    @given(st.lists(frames, max_size=40) | frames.map(lambda frame: [frame] * BABBLE_FRAMES))
+    def arrive(arriving: list[Frame]) -> None:
+        nonlocal count
+        for mode, robot, observer in zip(modes, robots, observers, strict=True):
+            sent = observer.tick(arriving, with_drives=mode is Mode.IDLE)
+            count += len(sent)
+            assert [frame for frame in sent if not is_harmless(frame, drive.partition(":")[0])] == []
+            assert robot.loop.mode is mode
+
+    arrive()
+    assert count > 100
+
+
+def moteus_frame(data: bytes) -> Frame:
+    return Frame(0x8001, data, is_extended=True, is_fd=True)
+
+
+@pytest.mark.parametrize(
+    ("drive", "frame", "harmless"),
+    [
+        ("odrive", Frame(0x00E, bytes(4)), True),
+        ("odrive", Frame(0x00E, b"\1\0\0\0"), False),
+        ("odrive", Frame(0x007, b"\x08\0\0\0"), False),
+        ("odrive", Frame(0x00E, is_remote=True), False),
+        ("odrive", Frame(0x004, b"\1\2\0\0"), False),
+        ("odrive", Frame(0x00C, bytes(8)), False),
+        ("odrive", Frame(0x00E, bytes(4), is_extended=True), False),
+        ("odrive05", Frame(0x00A, is_remote=True), True),
+        ("odrive05", Frame(0x016, is_remote=True), False),  # a restart
+        ("odrive05", Frame(0x006, is_remote=True), False),  # a new node id
+        ("odrive05", Frame(0x018), True),
+        ("odrive05", Frame(0x004, bytes(4)), False),
+        ("moteus", moteus_frame(moteus.STOP_AND_QUERY), True),
+        ("moteus", moteus_frame(settings.QUESTIONS[0]), True),
+        ("moteus", moteus_frame(moteus.encode_torque(0.0)), False),
+        ("moteus", moteus_frame(registers.encode_console(registers.CONSOLE_INPUT, b"conf set a.b 3\n")), False),
+        ("moteus", moteus_frame(b"\xff"), False),
+        ("mit", Frame(0x001, mit.LEAVE), True),
+        ("mit", Frame(0x001, mit.ENTER), False),
+        ("mit", Frame(0x001, mit.encode_torque(0.0, 10.0)), False),  # half a step of torque
+        ("mit", Frame(0x7FF, mit.encode_read(1, 9)), True),
+        ("mit", Frame(0x7FF, mit.encode_register(1, mit.WRITE, 9, bytes(4))), False),
+        ("mit", Frame(0x001, mit.LEAVE, is_fd=True), False),
+    ],
+)
+def test_the_list_knows_what_a_disarmed_robot_must_not_send(drive: str, frame: Frame, harmless: bool) -> None:
+    assert is_harmless(frame, drive) == harmless
