@@ -100,6 +100,16 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
 SOUND = run()
 
 
+def opened(component: str, kind: str, inner: MockPort | None = None) -> tuple[MockPort, FailingPort, Failures]:
+    """Return the robot's end of a bus, and the port of the loop with a failure that has begun."""
+    failures, bus = Failures(("left",)), MockBus()
+    robot = bus.open()
+    port = FailingPort("left", inner or bus.open(), DRIVES, failures)
+    failures.update(0.0)
+    assert failures.begin(component, kind, 0.0) is None
+    return robot, port, failures
+
+
 def differing(one: dict[int, Any], other: dict[int, Any]) -> set[int]:
     return {identifier for identifier in one.keys() | other.keys() if one.get(identifier) != other.get(identifier)}
 
@@ -239,11 +249,7 @@ def test_random_errors_are_never_none_and_leave_the_state_unchanged() -> None:
 
 
 def test_a_malformed_heartbeat_of_a_drive_with_an_error_stays_malformed() -> None:
-    failures, bus = Failures(("left",)), MockBus()
-    robot, inner = bus.open(), bus.open()
-    port = FailingPort("left", inner, DRIVES, failures)
-    failures.begin("left_sweep.error", "stuck", 0.0)
-    failures.update(0.0)
+    robot, port, _ = opened("left_sweep.error", "stuck")
     robot.send(Frame(arbitration_id(0, codec.HEARTBEAT), b"\1"))
     (frame,) = port.receive()
     with pytest.raises(MalformedMessageError):
@@ -281,10 +287,7 @@ def test_frames_of_unknown_ids_and_other_formats_suffer_only_from_failures_of_th
         Frame(arbitration_id(0, codec.GET_IQ), b"\0" * 8, is_extended=True),
     ]
     for component, passed in (("left_sweep", foreign), ("bus.left", [])):
-        failures, bus = Failures(("left",)), MockBus()
-        robot, inner = bus.open(), bus.open()
-        port = FailingPort("left", inner, DRIVES, failures)
-        failures.begin(component, "off", 0.0)
+        robot, port, _ = opened(component, "off")
         for frame in foreign:
             robot.send(frame)
         assert list(port.receive()) == passed
@@ -301,8 +304,8 @@ class FullPort(MockPort):
 def test_the_trouble_of_the_wrapped_port_shows_through() -> None:
     inner = FullPort(MockBus())
     inner.error_frames, inner.state = 4, BusState.PASSIVE
-    failures = Failures(("left",))
-    port = FailingPort("left", inner, DRIVES, failures)
+    _, port, failures = opened("pose", "off", inner)
+    failures.end_all()
     port.send(Frame(1))
     assert (port.failed_sends, port.error_frames, port.state) == (1, 4, BusState.PASSIVE)
     assert port.last_send_error == "of its own"
@@ -313,11 +316,7 @@ def test_the_trouble_of_the_wrapped_port_shows_through() -> None:
 
 def test_late_commands_arrive_at_once_and_in_order_when_all_failures_are_ended() -> None:
     """A disarm that follows them is not delayed."""
-    failures, bus = Failures(("left",)), MockBus()
-    robot, inner = bus.open(), bus.open()
-    port = FailingPort("left", inner, DRIVES, failures)
-    failures.update(0.0)
-    failures.begin("left_sweep.command", "slow", 0.0)
+    robot, port, failures = opened("left_sweep.command", "slow")
     frames = [Frame(arbitration_id(0, codec.SET_INPUT_TORQUE), bytes([number] * 4)) for number in range(3)]
     for frame in frames[:2]:
         port.send(frame)
