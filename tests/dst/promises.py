@@ -354,15 +354,18 @@ class BoundedEnergy(Promise):
         self._bounds = energy_bounds(self.loop.configuration)
         self._rise = EnergyRise(self.robot, self.reach)
         self._held_s = self._stopping_j = self._excess_j = 0.0
+        self._before_s = self.robot.lockstep.robot.now_s
         self._strongest, self._was_on = 1.0, False
 
     def update(self) -> Iterator[str]:
+        now_s = self.robot.lockstep.robot.now_s  # of the mechanics, which go on while the process stands still
+        since_s, self._before_s = now_s - self._before_s, now_s
         if not self.robot.harmed:
             self._rise.reset()
             return
         self._allow_strong_motors()
         if self.loop.mode in HELD:
-            self._held_s += self.loop.period_s
+            self._held_s += since_s
         for fault in self.loop.faults.begun:
             if fault.kind.reaction >= Reaction.SOFT_STOP:
                 self._stopping_j = max(self._stopping_j, self._bounds.fault_j(fault.kind))
