@@ -35,6 +35,7 @@ class SimulatedDrive(ABC):
 
     units_per_turn = 1.0  # of the motor's angle: turns, or the radians of a protocol that has them
     boot_s = 0.5  # silence of a drive that restarts
+    no_load_rad_s = float("inf")  # the speed at which the motor's voltage is used up and it drives no further
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters

@@ -75,12 +75,12 @@ class LimitedMotors(Promise):
     def begin(self) -> None:
         limits = self.loop.configuration.limits
         self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
-        self._fast_rad_s = limits.velocity_rad_s
         self._least_nm = WEAKEST * self._largest_nm  # less is within the limit for any gain of the motor
         drive = self.loop.configuration.drive
         self._codes_nm = [type_of(drive[joint]).gate_table(drive[joint]).torque_step_nm for joint in JOINTS]
         self._torques_nm: Torques | None = None  # one step of the mechanics ago
         drives = self.robot.lockstep.robot.drives
+        self._fast_rad_s = [min(limits.velocity_rad_s, each.no_load_rad_s) for each in drives]
         self._before_nm = [drive.torque_nm(self.robot.lockstep.robot.now_s) for drive in drives]  # as commanded
         self._fast_s = [NEVER_S] * len(JOINTS)
         self._changed_s = [self.robot.now_s] * len(JOINTS)
@@ -93,7 +93,7 @@ class LimitedMotors(Promise):
         self._torques_nm = self._torques_nm or torques_nm
         for index, torque_nm in enumerate(torques_nm):
             speed_rad_s = robot.plant.velocities_rad_s[index] if torque_nm else 0.0
-            if abs(speed_rad_s) > self._fast_rad_s:  # the drive's own clamp brakes it
+            if abs(speed_rad_s) > self._fast_rad_s[index]:  # the drive's own clamp brakes it, or its voltage is used up
                 self._fast_s[index] = robot.now_s
             if torque_nm != self._torques_nm[index] or abs(torque_nm) > self._least_nm:
                 self._check(index, torque_nm, speed_rad_s, robot.now_s)

@@ -46,6 +46,7 @@ class SimulatedMit(SimulatedDrive):
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         model = MODELS[parameters.model or DEFAULT_MODEL]
         self._model = model.with_ranges(parameters.velocity_range_rad_s, parameters.torque_range_nm)
+        self.no_load_rad_s = self._model.velocity_rad_s  # a maker's code for the speed ends where the motor's ends
         self._feedback_id = codec.feedback_id(parameters.node_id, self._model)
         self.stored: dict[int, float] = {}  # registers that outlast a restart
         self._zero_rad = 0.0  # the encoder's angle that counts as zero
@@ -171,6 +172,8 @@ class SimulatedMit(SimulatedDrive):
         torque_nm += command.kd_nm_s_rad * (command.velocity_rad_s - self._speed)
         largest_nm = min(self.registers[TMAX], parameters.motor_current_limit_a * parameters.torque_constant_nm_a)
         torque_nm = max(-largest_nm, min(largest_nm, torque_nm))
+        if abs(self._speed) > self.no_load_rad_s and torque_nm * self._speed > 0.0:
+            torque_nm = 0.0
         if parameters.current_lag_s:
             torque_nm = self._lagged_nm(torque_nm, self._torque_nm, now_s)
         self._torque_nm = torque_nm
