@@ -18,6 +18,7 @@ import msgpack
 
 from control.records import JOINTS
 from drivers.fault_injection.failure_table import SCHEDULED, FailureMode
+from drivers.mit.parameters import MitParameters
 from firmware_host.daemon import Shutdown, end_safely
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.operator.operator_calls import Method, OperatorCalls
@@ -207,6 +208,13 @@ class OperatedRobot:
         self.end_failures()
         for drive in self.lockstep.robot.drives:
             drive.slipped_rad = 0.0
+
+    def power_cycle_failed_drives(self) -> None:
+        """Do what the operator of a CubeMars does whose error outlasts its cause: no command clears it."""
+        for joint, drive in zip(JOINTS, self.lockstep.robot.drives, strict=True):
+            parameters = self.loop.configuration.drive[joint]
+            if drive.failed and isinstance(parameters, MitParameters) and not parameters.ranges.has_registers:
+                drive.restart(self.lockstep.robot.now_s)
 
     def call(self, client: str, method: str, **params: Any) -> None:
         self._client(client).send(msgpack.packb([REQUEST, 1, method, params]))

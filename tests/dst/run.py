@@ -108,6 +108,8 @@ class Run:
         for tick in range(round(LONGEST_CLEARING_S / self._loop.period_s)):
             if self._is_ready():
                 return
+            if tick == CLEARING_TICKS - 1:
+                self._robot.power_cycle_failed_drives()
             if tick % CLEARING_TICKS == 0:
                 self._robot.call(STEWARD, "clear", zero=tick > CLEARING_TICKS)
             self._step()
