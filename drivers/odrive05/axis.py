@@ -19,7 +19,7 @@ from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
 from drivers.odrive.cansimple_axis import RESTART_SILENCE_S, CanSimpleAxis
-from drivers.odrive.codec import GET_ENCODER_ESTIMATES, AxisState, Message, arbitration_id
+from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_VERSION, AxisState, Message, arbitration_id
 from drivers.odrive.settings import DriveSettings
 from drivers.odrive05 import codec
 from drivers.odrive05.parameters import Odrive05Parameters
@@ -40,6 +40,7 @@ class Odrive05Axis(CanSimpleAxis):
 
     def __init__(self, joint: str, parameters: Odrive05Parameters, outlet: Outlet) -> None:
         self._proof = WatchdogProof(parameters.watchdog_s, parameters.heartbeat_period_s)
+        self._version_request = Frame(arbitration_id(parameters.node_id, GET_VERSION), is_remote=True)
         self._counts_request = Frame(arbitration_id(parameters.node_id, codec.GET_ENCODER_COUNT), is_remote=True)
         super().__init__(joint, parameters, outlet, DriveSettings())
 
@@ -210,9 +211,12 @@ class Odrive05Axis(CanSimpleAxis):
             super().request_supply()
 
     def request_settings(self, now_s: float) -> None:
-        """Ask for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has."""
+        """Ask for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has.
+
+        What else a drive of a known version is asked for would set a new node id in firmware 0.5.
+        """
         if self._proof.silent:
             return
-        for frame in self.settings.due_requests(self.parameters.node_id, now_s):
-            self._outlet.send(frame)
+        if self._version_request in self.settings.due_requests(self.parameters.node_id, now_s):
+            self._outlet.send(self._version_request)
             self._outlet.send(self._counts_request)

@@ -146,10 +146,14 @@ ODRIVE: Table = {"drive_settings": Difference("no setting but the watchdog is re
 ZERO = "an idle drive that reports exactly zero is asked for its counts"
 NO_TEMPERATURE = "its messages have no temperature: the winding's is computed from the current"
 COUNTED = "before its first closed loop its position is asked for, and not while its watchdog is tried"
-LOST_COUNTS = _also(COUNTED, "drive_late", "position_stale", "position_silent")
+UNKNOWN_POSITION = ("drive_late", "position_stale", "position_silent")
+LOST_COUNTS = _also(COUNTED, *UNKNOWN_POSITION)
 ODRIVE05: Table = {
-    **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown", "power_cut"), LOST_COUNTS),
-    **dict.fromkeys(("bus_off", "bus_refuses", "daemon_hung"), LOST_COUNTS),
+    **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown", "zero_shifted"), LOST_COUNTS),
+    **dict.fromkeys(("bus_off", "bus_refuses", "daemon_hung", "power_cut"), LOST_COUNTS),
+    "power_cut, the drives restart": _also(
+        f"{COUNTED}; an idle one has no current", *UNKNOWN_POSITION, "current_silent"
+    ),
     "drive_error, by its watchdog": _also(
         f"{ZERO}, and no question reaches it", "drive_late", "position_stale", "position_silent"
     ),

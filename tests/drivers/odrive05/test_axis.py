@@ -316,6 +316,10 @@ def test_a_drive_with_a_version_has_another_firmware(bench: Bench) -> None:
     bench.read()
     assert (bench.health.firmware, bench.health.firmware_supported) == ("0.6.11", False)
     assert bench.health.supported_firmware == "0.5"
+    for now_s in (1.0, 12.0):
+        bench.drives.request_settings(now_s)
+    assert set(bench.far.receive()) <= {VERSION, COUNTS}  # firmware 0.5 would take a question for its id as a new one
+    assert bench.drives.refused_commands == 0
 
 
 def test_counts_that_do_not_fit_the_position_name_the_key(bench: Bench) -> None:
