@@ -29,8 +29,7 @@ from experiments.reports.mud_names import mud_label
 from experiments.study.option import Option
 from experiments.study.result import Result, Table
 from experiments.study.trials import Trials
-from experiments.trackway.depth_rule import walking_world
-from experiments.trackway.one_mud import CONSTANT_STRIDES, speed_cm_s, walk_in_mud, walks_in
+from experiments.trackway.simulated_walk import CONSTANT_STRIDES, speed_cm_s, walk_in_mud, walking_world, walks_in
 from experiments.trackway.table_one import FIXED_DEPTHS_M, PAPER_TABLE
 from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.clay import MUDS

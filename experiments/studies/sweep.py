@@ -21,19 +21,21 @@ from experiments.reports.text_tables import number
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
-from experiments.trackway.depth_rule import METHODS, arm_m, walking_world
-from experiments.trackway.one_mud import (
+from experiments.trackway.plots import MARKS, TEXT
+from experiments.trackway.simulated_walk import (
     CONSTANT_STRIDES,
     LEARNING,
+    METHODS,
     STARTING,
+    arm_m,
     best_depth,
     constant_rows,
     mean_speeds_cm_s,
     speed_cm_s,
     walk_in_mud,
+    walking_world,
     walks_in,
 )
-from experiments.trackway.plots import MARKS, TEXT
 from experiments.trackway.table_one import count_failures
 from experiments.trackway.walk import Walk
 from simulation.mud.disturbances import TRACKWAY

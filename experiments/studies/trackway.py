@@ -21,17 +21,20 @@ from experiments.study.session import Session
 from experiments.study.trials import Trials
 from experiments.study.values import mud_length
 from experiments.trackway import bench
-from experiments.trackway.depth_rule import arm_m, walking_world
 from experiments.trackway.figures import walk_figures
-from experiments.trackway.one_mud import (
+from experiments.trackway.plots import draw_trackway
+from experiments.trackway.simulated_walk import (
     CONSTANT_STRIDES,
+    arm_m,
     best_depth,
     constant_rows,
+    end_of,
     mean_speeds_cm_s,
     walk_in_mud,
+    walk_trackway,
+    walking_world,
     walks_in,
 )
-from experiments.trackway.plots import draw_trackway
 from experiments.trackway.table_one import (
     ADAPTIVE,
     FIXED_DEPTHS_M,
@@ -42,7 +45,6 @@ from experiments.trackway.table_one import (
     speed_table,
     table_one,
 )
-from experiments.trackway.track_walk import end_of, walk_trackway
 from experiments.trials.mud_trials import open_bench, run_trials
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import TRACKWAY
@@ -94,7 +96,9 @@ def study(
         "constant_seeds": CONSTANT_SEEDS,
         "disturbances": asdict(TRACKWAY),
     }
-    ends = {name: dict(Counter(end_of(walk, length_m) for walk in own)) for name, own in by_gait.items()}
+    ends = {
+        name: Counter(walk.fault or end_of(walk.strides, length_m) for walk in own) for name, own in by_gait.items()
+    }
     report = table_one(by_gait, arm_m(), ends, settings)
     report |= compare_with_best(report["table"], speeds)
     return Result(

@@ -30,9 +30,8 @@ from experiments.robot.bench_robot import (
 )
 from experiments.study.notebook import Entry
 from experiments.study.option import OptionError
-from experiments.trackway.depth_rule import DepthRule, constant_depth
+from experiments.trackway.simulated_walk import STUCK_S
 from experiments.trackway.table_one import ADAPTIVE, FIXED_DEPTHS_M, Summary, table_one
-from experiments.trackway.track_walk import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from firmware_host.configuration.configuration import Configuration
@@ -86,17 +85,16 @@ class Trackway:
         }
 
     @property
-    def rules(self) -> dict[str, DepthRule]:
-        """By name: the fixed depths, and the adaptive gait by the method that the robot is configured with."""
-        fixed = [constant_depth(depth_m) for depth_m in self.depths_m]
-        return {rule.name: rule for rule in (*fixed, DepthRule(ADAPTIVE, 0.0, "configured"))}
+    def gaits(self) -> dict[str, dict[str, float]]:
+        """By name, what is ordered: a fixed depth, or the method of adaptation that the robot is configured with."""
+        return {f"{100.0 * depth_m:g} cm": {"depth_m": depth_m} for depth_m in self.depths_m} | {ADAPTIVE: {}}
 
     @property
     def planned(self) -> list[PlannedTrial]:
         return [
-            PlannedTrial(f"{rule}, trial {number}", rule, number, self.trials)
+            PlannedTrial(f"{gait}, trial {number}", gait, number, self.trials)
             for number in range(1, self.trials + 1)
-            for rule in self.rules
+            for gait in self.gaits
         ]
 
     def mud_at(self, position_m: float) -> str:
@@ -107,16 +105,17 @@ class Trackway:
 
 def measure(bench: Bench, trackway: Trackway, trial: PlannedTrial) -> Entry:
     """Walk one trial, from torque on to torque off. Raises InvalidTrialError for one that was stopped, BenchError."""
-    robot, rule = bench.robot, trackway.rules[trial.group]
+    robot = bench.robot
     _require_pose(robot)
     arm(robot, bench.operator)
     before = _require_pose(robot)
     start_m = before["body_x_m"]
-    robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
-    end = _follow(robot, trackway, start_m)
+    zero_m = start_m - reach_of(robot.configuration)
+    robot.call("walk", **trackway.gaits[trial.group])
+    end, status = follow_walk(robot, lambda now_s: Progress(trackway, zero_m, now_s).evaluate)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
-    if not end.why and after["mode"] != "hold":
-        end = End(mode_reason(after), stopped=True)
+    if end is None or not end.why and after["mode"] != "hold":
+        end = End(mode_reason(after if end else status), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = logged_strides(log, robot.configuration, lambda position_m: trackway.mud_at(position_m - start_m))
@@ -138,13 +137,6 @@ def _require_pose(robot: BenchRobot) -> Status:
         robot.wait(POLL_S)
         status = robot.call("status")
     return status
-
-
-def _follow(robot: BenchRobot, trackway: Trackway, start_m: float) -> End:
-    """Wait until the walk is over, or stop it."""
-    zero_m = start_m - reach_of(robot.configuration)
-    end, status = follow_walk(robot, lambda now_s: Progress(trackway, zero_m, now_s).evaluate)
-    return End(mode_reason(status), stopped=True) if end is None else end
 
 
 def reach_of(configuration: Configuration) -> float:
@@ -180,20 +172,21 @@ class Progress:
 
 
 def summary_of(walk: Walk) -> str:
-    with_pose = _with_pose(walk)
-    speed = f"{100.0 * speed_m_s(with_pose):.1f} cm/s" if with_pose else "no stride with a pose"
-    lost = len(walk.strides) - len(with_pose)
+    located = located_strides(walk)
+    speed = f"{100.0 * speed_m_s(located):.1f} cm/s" if located else "no stride with a pose"
+    lost = len(walk.strides) - len(located)
     lost_text = f", {lost} of them without a pose" if lost else ""
     fault = f"; {walk.fault}" if walk.fault else ""
     return f"{counted(len(walk.strides), 'stride')}{lost_text}, {speed}{fault}"
 
 
-def _with_pose(walk: Walk) -> list[WalkedStride]:
+def located_strides(walk: Walk) -> list[WalkedStride]:
+    """Return the strides with a pose at both ends."""
     return [stride for stride in walk.strides if isfinite(stride.step_m)]
 
 
 def first_walks(trackway: Trackway, entries: Mapping[str, Entry]) -> dict[str, LoggedTime]:
-    """Return the first walk of each gait that counts, by its key in the notebook."""
+    """Return the first walk of each gait that counts and has strides, by its key in the notebook."""
     first: dict[str, tuple[str, LoggedTime]] = {}
     for trial in trackway.planned:
         entry = entries.get(trial.key)
@@ -204,15 +197,15 @@ def first_walks(trackway: Trackway, entries: Mapping[str, Entry]) -> dict[str, L
 
 def report_of(trackway: Trackway, entries: Mapping[str, Entry], arm_m: float) -> Summary:
     """Report the trials that count. Strides without a position are only counted; those past the end are left out."""
-    walks: dict[str, list[Walk]] = {rule: [] for rule in trackway.rules}
-    ends: dict[str, Counter[str]] = {rule: Counter() for rule in trackway.rules}
-    counting, without_pose = [trial for trial in trackway.planned if trial.key in entries], 0
-    for trial in counting:
-        walk = walk_of(entries[trial.key])
-        located = _with_pose(walk)
+    walks: dict[str, list[Walk]] = {gait: [] for gait in trackway.gaits}
+    counting = {trial.key: trial.group for trial in trackway.planned if trial.key in entries}
+    without_pose = 0
+    for key, gait in counting.items():
+        walk = walk_of(entries[key])
+        located = located_strides(walk)
         without_pose += len(walk.strides) - len(located)
-        walks[trial.group].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
-        ends[trial.group][walk.fault or "past the end"] += 1
+        walks[gait].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
+    ends = {gait: Counter(walk.fault or "past the end" for walk in own) for gait, own in walks.items()}
     settings = {
         "seeds": trackway.trials,
         "mud_length_cm": {name: 100.0 * length_m for name, length_m in trackway.muds},

@@ -2,14 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import accumulate, cycle
+from math import nan
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from pandas import DataFrame
 
 from experiments.reports.mud_names import mud_label
-from experiments.trackway.table_one import ADAPTIVE, Speed, Summary
+from experiments.trackway.table_one import ADAPTIVE, Summary
 from experiments.trackway.walk import EXTRACTION, SLIPPAGE
 
 COLOURS = {"3 cm": "tab:green", "5 cm": "tab:orange", ADAPTIVE: "tab:blue"}  # as in the paper
@@ -18,6 +21,9 @@ LINES, DOTS = ("-", "--", "-.", ":"), ("o", "s", "D", "^", "P", "*")  # the gait
 MUD_SHADES = ("#e9dfd0", "#f6f1e8", "#d8c7ad")
 MARKS = {SLIPPAGE: "v", EXTRACTION: "X"}
 TEXT = "#333333"
+DOT: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.6, "markersize": 7}
+UNREACHED = (nan, nan)
+Styles = Mapping[str, dict[str, Any]]  # of each gait's line and dots
 
 
 def draw_trackway(report: Summary) -> Figure:
@@ -26,18 +32,52 @@ def draw_trackway(report: Summary) -> Figure:
     axes = figure.subplot_mosaic(
         [["steps", "speeds"], ["depths", "speeds"]], width_ratios=(1.5, 1.0), height_ratios=(1.6, 1.0)
     )
-    colours = _colours(list(report["table"]))
-    _plot_steps(axes["steps"], report, colours)
-    _plot_walks(axes["depths"], report, colours, "depth_cm")
+    styles = _styles(list(report["table"]))
+    _draw_walks(axes["steps"], report, styles, "step_cm")
+    _name_steps(axes["steps"], report, styles)
+    _draw_walks(axes["depths"], report, styles, "depth_cm")
     axes["depths"].set_ylabel("depth (cm)")
     axes["depths"].invert_yaxis()
     axes["depths"].set_xlabel("position along the track (cm)")
-    _plot_speeds(axes["speeds"], report, colours)
+    _draw_speeds(axes["speeds"], report, styles)
     return figure
 
 
-def _plot_steps(panel: Axes, report: Summary, colours: Mapping[str, str]) -> None:
-    _plot_walks(panel, report, colours, "step_cm")
+def _styles(gaits: Sequence[str]) -> Styles:
+    others = cycle(OTHERS)
+    return {
+        gait: {
+            "color": COLOURS[gait] if gait in COLOURS else next(others),
+            "linestyle": LINES[i % len(LINES)],
+            "marker": DOTS[i % len(DOTS)],
+            "markersize": 4.0,
+        }
+        for i, gait in enumerate(gaits)
+    }
+
+
+def _mud_regions(report: Summary) -> list[tuple[str, float, float]]:
+    """Return name, beginning and end of each mud in cm along the track."""
+    lengths_cm = report["settings"]["mud_length_cm"]
+    ends_cm = accumulate(lengths_cm.values())
+    return [(mud, end - length, end) for (mud, length), end in zip(lengths_cm.items(), ends_cm, strict=True)]
+
+
+def _draw_walks(panel: Axes, report: Summary, styles: Styles, key: str) -> None:
+    """Draw the first walk of each gait on its muds."""
+    for shade, (_, begin_cm, end_cm) in zip(cycle(MUD_SHADES), _mud_regions(report), strict=False):
+        panel.axvspan(begin_cm, end_cm, color=shade, zorder=0)
+    panel.set_xlim(0.0, end_cm)
+    for gait, style in styles.items():
+        for strides in report["walks"][gait][:1]:  # none where every trial was left out
+            walk = DataFrame(strides, columns=["position_cm", key, "failure"])
+            panel.plot(walk["position_cm"], walk[key], linewidth=1.4, **style)
+            for failure, mark in MARKS.items():
+                failed = walk[walk["failure"] == failure]
+                panel.plot(failed["position_cm"], failed[key], mark, color=style["color"], **DOT)
+
+
+def _name_steps(panel: Axes, report: Summary, styles: Styles) -> None:
     panel.set_ylabel("step length (cm)")
     low, high = panel.get_ylim()
     panel.set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
@@ -45,90 +85,39 @@ def _plot_steps(panel: Axes, report: Summary, colours: Mapping[str, str]) -> Non
     for mud, begin_cm, end_cm in _mud_regions(report):
         panel.text((begin_cm + end_cm) / 2.0, 0.97, mud_label(mud), transform=across, ha="center", va="top", color=TEXT)
     panel.set_title("One walk of each gait over the trackway")
-    panel.legend(handles=_legend(colours, report), loc="lower left", ncols=2, framealpha=0.9)
+    failures = {stride["failure"] for trials in report["walks"].values() for walk in trials[:1] for stride in walk}
+    failed: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
+    marks = {name: failed | {"marker": mark} for name, mark in MARKS.items() if name in failures}
+    handles = [Line2D([], [], label=name, **style) for name, style in [*styles.items(), *marks.items()]]
+    panel.legend(handles=handles, loc="lower left", ncols=2, framealpha=0.9)
     panel.tick_params(labelbottom=False)
 
 
-def _plot_walks(panel: Axes, report: Summary, colours: Mapping[str, str], key: str) -> None:
-    """Draw the first walk of each gait on its muds."""
-    for shade, (_, begin_cm, end_cm) in zip(cycle(MUD_SHADES), _mud_regions(report), strict=False):
-        panel.axvspan(begin_cm, end_cm, color=shade, zorder=0)
-    panel.set_xlim(0.0, end_cm)
-    for style, rule in zip(_styles(colours), colours, strict=True):
-        for walk in report["walks"][rule][:1]:  # none where every trial was left out
-            _plot_walk(panel, walk, key, style)
-
-
-def _colours(rules: Sequence[str]) -> dict[str, str]:
-    others = iter(OTHERS * len(rules))
-    return {rule: COLOURS[rule] if rule in COLOURS else next(others) for rule in rules}
-
-
-def _styles(colours: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return the style of each gait's line and dots."""
-    return [
-        {"color": colour, "linestyle": LINES[i % len(LINES)], "marker": DOTS[i % len(DOTS)], "markersize": 4.0}
-        for i, colour in enumerate(colours.values())
-    ]
-
-
-def _mud_regions(report: Summary) -> list[tuple[str, float, float]]:
-    """Return name, beginning and end of each mud in cm along the track."""
-    lengths_cm = report["settings"]["mud_length_cm"]
-    ends_cm = list(accumulate(lengths_cm.values()))
-    return [(mud, end - length, end) for (mud, length), end in zip(lengths_cm.items(), ends_cm, strict=True)]
-
-
-def _plot_walk(panel: Axes, strides: Sequence[Summary], key: str, style: Mapping[str, Any]) -> None:
-    positions_cm = [stride["position_cm"] for stride in strides]
-    panel.plot(positions_cm, [stride[key] for stride in strides], linewidth=1.4, **style)
-    for failure, mark in MARKS.items():
-        failed = [stride for stride in strides if stride["failure"] == failure]
-        points = [stride["position_cm"] for stride in failed], [stride[key] for stride in failed]
-        panel.plot(*points, mark, color=style["color"], markeredgecolor="black", markeredgewidth=0.6, markersize=7)
-
-
-def _legend(colours: Mapping[str, str], report: Summary) -> list[Line2D]:
-    handles = [Line2D([], [], label=rule, **style) for rule, style in zip(colours, _styles(colours), strict=True)]
-    names = {stride["failure"] for trials in report["walks"].values() for trial in trials[:1] for stride in trial}
-    failed: dict[str, Any] = {"color": "lightgrey", "markeredgecolor": "black", "linestyle": ""}
-    return handles + [
-        Line2D([], [], marker=mark, label=name, **failed) for name, mark in MARKS.items() if name in names
-    ]
-
-
-def _plot_speeds(panel: Axes, report: Summary, colours: Mapping[str, str]) -> None:
+def _draw_speeds(panel: Axes, report: Summary, styles: Styles) -> None:
     """Draw the paper's speeds as bars and ours as dots; whiskers are one standard deviation of each."""
-    muds, width = list(report["settings"]["mud_length_cm"]), 0.8 / len(colours)
-    for i, (rule, style) in enumerate(zip(colours, _styles(colours), strict=True)):
-        xs = [mud + (i - (len(colours) - 1) / 2.0) * width for mud in range(len(muds))]
-        paper = report["paper"].get(rule) or {}
-        _plot_paper(panel, xs, [paper.get(mud) for mud in muds], 0.92 * width)
-        _plot_ours(panel, xs, [report["table"][rule][mud] for mud in muds], style)
+    muds, width = list(report["settings"]["mud_length_cm"]), 0.8 / len(styles)
+    for i, (gait, style) in enumerate(styles.items()):
+        places = np.arange(len(muds)) + (i - (len(styles) - 1) / 2.0) * width
+        papers = report["paper"].get(gait, {})
+        bars = _speeds([papers.get(mud, UNREACHED) for mud in muds], places)
+        panel.bar(bars.index, bars["mean"], 0.92 * width, yerr=bars["sd"],
+                  color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
+        ours = [report["table"][gait][mud] for mud in muds]
+        dots = _speeds([(cell["mean"], cell["sd"] or 0.0) for cell in ours], places)
+        panel.errorbar(dots.index, dots["mean"], dots["sd"], fmt=style["marker"], color=style["color"],
+                       capsize=3, **DOT)  # fmt: skip
     best_depths = report.get("best_constant_depth", {})
-    for mud, best in enumerate(best_depths.values()):
-        panel.hlines(best["mean"], mud - 0.42, mud + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
+    for place, best in enumerate(best_depths.values()):
+        panel.hlines(best["mean"], place - 0.42, place + 0.42, color=TEXT, linewidth=1.0, linestyle=":")
     panel.set_xticks(range(len(muds)), [mud_label(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set_ylabel("speed (cm/s)")
     panel.set_title("Table I: the paper's (grey bars), ours (dots), ± sd")
     if best_depths:
-        dots = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
-        panel.legend(handles=[dots], loc="upper right")
+        dots_of_best = Line2D([], [], color=TEXT, linestyle=":", label="best constant depth")
+        panel.legend(handles=[dots_of_best], loc="upper right")
 
 
-def _plot_paper(panel: Axes, xs: Sequence[float], speeds: Sequence[Speed | None], width: float) -> None:
-    known = [(x, speed) for x, speed in zip(xs, speeds, strict=True) if speed]
-    if known:
-        panel.bar([x for x, _ in known], [speed.mean for _, speed in known], width,
-                  yerr=[speed.sd for _, speed in known],
-                  color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)  # fmt: skip
-
-
-def _plot_ours(panel: Axes, xs: Sequence[float], cells: Sequence[Summary], style: Mapping[str, Any]) -> None:
-    reached = [
-        (x, cell["mean"], cell["sd"] or 0.0) for x, cell in zip(xs, cells, strict=True) if cell["mean"] is not None
-    ]
-    panel.errorbar([x for x, *_ in reached], [mean for _, mean, _ in reached], [sd for *_, sd in reached],
-                   fmt=style["marker"], color=style["color"],
-                   markeredgecolor="black", markeredgewidth=0.6, markersize=7, capsize=3)  # fmt: skip
+def _speeds(speeds: Sequence[tuple[float | None, float]], places: Any) -> DataFrame:
+    """Return mean and standard deviation of the muds that were reached, by place in the picture."""
+    return DataFrame(speeds, columns=["mean", "sd"], index=places, dtype=float).dropna()

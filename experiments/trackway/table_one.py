@@ -17,7 +17,7 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_label
 from experiments.reports.text_tables import number
 from experiments.study.result import Table
-from experiments.trackway.one_mud import LEARNING
+from experiments.trackway.simulated_walk import LEARNING
 from experiments.trackway.walk import Walk, WalkedStride, speed_m_s
 
 Summary = dict[str, Any]
@@ -124,15 +124,13 @@ def _sd(speeds: Sequence[float]) -> float | None:
 def speed_table(report: Summary) -> Table:
     """Return Table I: each gait after the second stride, over all strides, and the paper's."""
     rows = []
-    for rule, row in report["table"].items():
-        over = report["mean_over_muds"][rule]
-        cells = {mud: _plus_minus(cell["mean"], cell["sd"]) for mud, cell in row.items()}
-        rows.append(_speed_row(rule, cells, over["mean"]))
-        cells = {mud: _plus_minus(cell["mean_all"], cell["sd_all"]) for mud, cell in row.items()}
-        rows.append(_speed_row("  all strides", cells, over["mean_all"]))
-        if rule in PAPER_TABLE:
-            mean = fmean(speed.mean for speed in PAPER_TABLE[rule].values())
-            rows.append(_speed_row("  paper", {mud: _paper_text(report, rule, mud) for mud in row}, mean))
+    for gait, row in report["table"].items():
+        for head, mean, sd in ((gait, "mean", "sd"), ("  all strides", "mean_all", "sd_all")):
+            cells = {mud: _plus_minus(cell[mean], cell[sd]) for mud, cell in row.items()}
+            rows.append(_speed_row(head, cells, report["mean_over_muds"][gait][mean]))
+        if gait in PAPER_TABLE:
+            over_muds = fmean(speed.mean for speed in PAPER_TABLE[gait].values())
+            rows.append(_speed_row("  paper", {mud: _paper_text(report, gait, mud) for mud in row}, over_muds))
     trials = counted(report["settings"]["seeds"], "trial")
     title = f"Table I: speed after the second stride in each mud, mean ± sd of {trials}"
     return Table("table", title, {"speed": "cm/s"}, DataFrame(rows), "Table I")

@@ -9,18 +9,17 @@ extraction, because the plates are still in the mud when they swing forward.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import fsum, inf, isfinite, sin
+from itertools import accumulate
+from math import fsum, isfinite, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import UNKNOWN, Phase
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import Log
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.track import Track
 
 SLIPPAGE, EXTRACTION, RECOVERED = "slippage", "extraction", "recovered"
 PUSHED_BACK_M = 0.01  # a flipper that comes out of the mud moves the body by less
@@ -82,7 +81,7 @@ class WalkTick(NamedTuple):
 
 
 class StrideRecord:
-    """Owns the strides of a walk so far, and the measurements of the stride under way.
+    """Owns the strides of a walk so far, and the ticks of the stride under way.
 
     A stride counts once the next one has begun: the stride in which a walk ends has no length.
     """
@@ -91,52 +90,30 @@ class StrideRecord:
         """`mud_at` names the mud at a position of the plates in metres."""
         self.strides: list[WalkedStride] = []
         self._mud_at = mud_at
-        self._start_stride(WalkTick(0.0, -1, Phase.REST, 0.0, 0.0, 0.0))
-
-    def _start_stride(self, tick: WalkTick) -> None:
-        self._first = self._last = tick
-        self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
-        self._ticks_after = self._seen_after = 0
+        self._ticks: list[WalkTick] = []
 
     def update(self, tick: WalkTick) -> None:
-        if tick.stride != self._first.stride:
-            if 0 <= self._first.stride == tick.stride - 1:
-                self._finish_stride(tick)
-            self._start_stride(tick)
-        self._last = tick
-        self._recovered = self._recovered or tick.phase == Phase.RECOVERY
-        if tick.phase in AFTER_STANCE:
-            self._ticks_after += 1
-            if isfinite(tick.body_m):
-                self._seen_after += 1
-                self._furthest_m = max(self._furthest_m, tick.body_m)
-                self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - tick.body_m)
+        if self._ticks and tick.stride != self._ticks[0].stride:
+            if tick.stride == self._ticks[0].stride + 1:
+                self.strides.append(self._finished_stride(tick))
+            self._ticks = []
+        if tick.stride >= 0:
+            self._ticks.append(tick)
 
-    def _finish_stride(self, tick: WalkTick) -> None:
-        first, seen = self._first, self._seen_after >= SEEN_FRACTION * self._ticks_after
-        self.strides.append(
-            WalkedStride(
-                mud=self._mud_at(first.plates_m) if isfinite(first.plates_m) else NO_MUD,
-                position_m=first.plates_m,
-                depth_m=self._last.depth_m,
-                step_m=tick.body_m - first.body_m,
-                duration_s=tick.now_s - first.now_s,
-                pushed_back_m=self._pushed_back_m if seen else UNKNOWN,
-                recovered=self._recovered,
-            )
+    def _finished_stride(self, following: WalkTick) -> WalkedStride:
+        first, last = self._ticks[0], self._ticks[-1]
+        after_m = [tick.body_m for tick in self._ticks if tick.phase in AFTER_STANCE]
+        seen_m = [body_m for body_m in after_m if isfinite(body_m)]
+        losses_m = (furthest_m - body_m for furthest_m, body_m in zip(accumulate(seen_m, max), seen_m, strict=True))
+        return WalkedStride(
+            mud=self._mud_at(first.plates_m) if isfinite(first.plates_m) else NO_MUD,
+            position_m=first.plates_m,
+            depth_m=last.depth_m,
+            step_m=following.body_m - first.body_m,
+            duration_s=following.now_s - first.now_s,
+            pushed_back_m=max(losses_m, default=0.0) if len(seen_m) >= SEEN_FRACTION * len(after_m) else UNKNOWN,
+            recovered=any(tick.phase == Phase.RECOVERY for tick in self._ticks),
         )
-
-
-def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
-    """Walk until `done` accepts the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
-    lockstep.arm()
-    lockstep.walk(order)
-    record = StrideRecord(lambda position_m: track.clay_at(position_m).name)
-    while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
-        lockstep.step()
-        record.update(tick_of(lockstep))
-    fault = lockstep.loop.fault
-    return Walk(record.strides, fault.message if fault else "")
 
 
 def tick_of(lockstep: Lockstep) -> WalkTick:

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.studies import mud_fit
 from experiments.studies.mud_fit import study
-from experiments.trackway.one_mud import speed_cm_s, walk_in_mud
+from experiments.trackway.simulated_walk import speed_cm_s, walk_in_mud
 from experiments.trackway.table_one import Speed
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.body.plant_parameters import PlantParameters

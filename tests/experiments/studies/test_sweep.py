@@ -8,7 +8,7 @@ import pytest
 
 from experiments.studies.sweep import STRENGTHS_PA, draw, study
 from experiments.study.result import Result
-from experiments.trackway.one_mud import DEPTHS_M
+from experiments.trackway.simulated_walk import DEPTHS_M
 from experiments.trackway.walk import Walk, WalkedStride
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 

@@ -8,9 +8,16 @@ import pytest
 
 from experiments.studies.trackway import gaits_of, study
 from experiments.study.result import Result
-from experiments.trackway.one_mud import DEPTHS_M, best_depth, speed_cm_s
 from experiments.trackway.plots import draw_trackway
-from experiments.trackway.track_walk import end_of, is_over, walk_trackway
+from experiments.trackway.simulated_walk import (
+    DEPTHS_M,
+    METHODS,
+    best_depth,
+    end_of,
+    robot_of,
+    speed_cm_s,
+    walk_trackway,
+)
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import paper_track
@@ -51,15 +58,31 @@ def test_the_simulated_trackway_is_the_papers() -> None:
 # the end of a walk, and the strides that count
 
 
-@pytest.mark.parametrize(("step_m", "over"), [(0.12, False), (0.14, True), (0.13, True)])
-def test_a_walk_is_over_when_the_plates_would_go_down_past_the_end(step_m: float, over: bool) -> None:
-    assert is_over(1.75, [stride("45.3", 1.62, step_m)]) is over
+SLOW = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
 
 
-def test_a_walk_is_over_after_90_s_in_one_mud_and_not_in_all_muds() -> None:
-    slow = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
-    assert not is_over(1.83, []) and not is_over(1.83, slow)
-    assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
+@pytest.mark.parametrize(
+    ("strides", "end"),
+    [
+        ([], ""),
+        ([stride("45.3", 1.62, 0.12)], ""),
+        ([stride("45.3", 1.62, 0.13)], "past the end"),
+        ([stride("45.3", 1.62, 0.14)], "past the end"),
+        (SLOW, ""),
+        ([*SLOW, stride("b", 0.7, 0.0, 2.0)], "stuck in b"),
+    ],
+)
+def test_a_walk_ends_where_the_plates_would_go_down_past_the_end_and_after_90_s_in_one_mud(
+    strides: list[WalkedStride], end: str
+) -> None:
+    assert end_of(strides, 1.75) == end
+
+
+@pytest.mark.parametrize("method", ["", *METHODS])
+def test_a_constant_depth_and_the_paper_s_method_are_walked_by_the_papers_robot(method: str) -> None:
+    robot = robot_of(method)
+    assert robot.estimation.method == ("paper" if method in ("", "paper") else "default")
+    assert not method or robot.adaptation.method == method
 
 
 def test_the_first_stride_of_a_constant_depth_does_not_count() -> None:
@@ -86,7 +109,7 @@ def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
 
 
 def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
-    result = reported(Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001)] * 2, ""))
+    result = reported(Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001, 50.0)] * 2, ""))
     report = result.summary
     assert report["table"]["3 cm"]["45.3"]["mean"] is None
     assert report["within_one_sd"]["3 cm"]["45.3"] is None
@@ -97,12 +120,9 @@ def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
 
 
 def test_the_picture_has_a_line_for_each_gait_and_a_dot_for_each_speed() -> None:
-    panels = draw_trackway(reported().summary).axes
-    assert [panel.get_ylabel() for panel in panels] == ["step length (cm)", "depth (cm)", "speed (cm/s)"] or len(
-        panels
-    ) == 3
-    steps = next(panel for panel in panels if panel.get_ylabel() == "step length (cm)")
-    assert len(steps.lines) >= 4 and steps.get_legend() is not None
+    panels = {panel.get_ylabel(): panel for panel in draw_trackway(reported().summary).axes}
+    assert set(panels) == {"step length (cm)", "depth (cm)", "speed (cm/s)"}
+    assert len(panels["step length (cm)"].lines) >= 4 and panels["step length (cm)"].get_legend() is not None
 
 
 # in simulation
@@ -117,7 +137,7 @@ def short() -> dict[str, Walk]:
 def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end(short: dict[str, Walk]) -> None:
     for walk in short.values():
         assert list(dict.fromkeys(each.mud for each in walk.strides)) == NAMES
-        assert end_of(walk, 0.6) == "past the end"
+        assert end_of(walk.strides, 0.6) == "past the end"
 
 
 def test_fixed_gaits_keep_their_depth_and_the_adaptive_one_does_not(short: dict[str, Walk]) -> None:

@@ -12,7 +12,7 @@ import pytest
 from experiments.study.notebook import Entry
 from experiments.study.provenance import PACKAGES
 from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
-from experiments.trackway.one_mud import walk_in_mud
+from experiments.trackway.simulated_walk import walk_in_mud
 from tests.folders import ROOT
 
 pytest.importorskip("distributed", reason="needs the extra cluster")
