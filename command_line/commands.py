@@ -1,14 +1,13 @@
 """The commands of `mudskipper`: the function and the help of each.
 
-A function is named as `module.function` below this package, and imported when its command is used.
+A function is named as `module.function` below this package, and imported when its command is used. So are a study
+and the commands of a group.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-# A function, the commands of a group, or what adds the options itself
-Target: TypeAlias = "str | Mapping[str, Command] | Callable[[Any], None]"
-Command: TypeAlias = tuple[Target, str]  # with its help
+Command: TypeAlias = tuple[Any, str]  # a name, the commands of a group or a study, with the help
 
 DRIVES: Mapping[str, Command] = {
     "find": ("drives.find.find", "List the drives that answer on the buses."),
@@ -53,7 +52,7 @@ COMMANDS: Mapping[str, Command] = {
     "upgrade": ("install.upgrade.upgrade", "Say what another version's package changes, and install it."),
     "drives": (DRIVES, "Find and set up motor drives, while the daemon does not run."),
     "calibrate": (
-        "options.studies.add_calibrate",
+        "experiments.studies.CALIBRATE",
         "Calibrate signs, zeros, ranges, velocity, torque and friction, while the daemon does not run.",
     ),
     "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
@@ -62,5 +61,5 @@ COMMANDS: Mapping[str, Command] = {
     "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
     "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
     "log": (LOGS, "Read and manage logs."),
-    "experiment": ("options.studies.add_experiment", "The paper's experiments."),
+    "experiment": ("experiments.studies.STUDIES", "The paper's experiments."),
 }

@@ -2,10 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable, Sequence
-from importlib import import_module
+from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import Any
 
 from command_line import exit_codes
 from command_line.errors import report
@@ -40,11 +38,10 @@ def _answer(given: Sequence[str], status: int) -> None:
 def _run(given: Sequence[str]) -> int:
     try:
         options = build_parser(given).parse_args(given)
-        if callable(options.function):
-            return int(options.function(**given_options(options, options.function)))
-        module, function = options.function.rsplit(".", 1)
-        run: Callable[[Any], int] = getattr(import_module(f"command_line.{module}"), function)
-        return run(options)
+        target = options.target
+        if hasattr(target, "run"):  # a study, which several functions run
+            return int(target.run(options))
+        return int(target(**given_options(options, target)))
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed it

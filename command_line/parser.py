@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from command_line import exit_codes
-from command_line.commands import COMMANDS, Command, Target
+from command_line.commands import COMMANDS, Command
 from command_line.function_options import add_function_options
 from command_line.screen import complaints
 from control.computing.suggestion import suggestion
@@ -37,35 +37,28 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
 
-    def __init__(self, *arguments: Any, target: Target = "", **keywords: Any) -> None:
-        """Make the parser of a function, named as `module.function` below command_line, or of a group of commands.
-
-        A target that can be called adds the options itself.
-        """
+    def __init__(self, *arguments: Any, target: Any = None, **keywords: Any) -> None:
+        """`target`: what the parser is for, as in COMMANDS."""
         super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
         self._target = target
 
     def add_target(self) -> None:
-        """Add the options of the function, or the commands of the group, once."""
-        target, self._target = self._target, ""
+        """Add the options of the function or the study, or the commands of the group, once."""
+        target, self._target = self._target, None
+        if isinstance(target, str):
+            module, name = target.rsplit(".", 1)
+            target = getattr(import_module(f"command_line.{module}"), name)
         if isinstance(target, Mapping):
             self.add_commands(target)
-        elif callable(target):
-            target(self)
-        elif target:
-            module, name = target.rsplit(".", 1)
-            function = getattr(import_module(f"command_line.{module}"), name)
-            if target.startswith("options."):  # of the studies, which declare their own
-                function(self)
-            else:
-                add_function_options(self, function)
-                self.set_defaults(function=function)
+        elif target is not None:
+            add_function_options(self, *(target.functions() if hasattr(target, "functions") else [target]))
+            self.set_defaults(target=target)
 
     def add_commands(self, commands: Mapping[str, Command], title: str = "action") -> None:
         """Add a parser for each command."""
         choices = self.add_subparsers(dest=title, required=True, metavar=title)
         for name, (target, text) in commands.items():
-            choices.add_parser(name, help=text, description=text, target=target)
+            choices.add_parser(name, help=text.partition("\n")[0], description=text, target=target)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuse unknown arguments, so that a command names its own usage, not that of `mudskipper`."""

@@ -1,30 +1,37 @@
 """Runs a study from the command line: folder, progress and prompts before it, page, numbers and exit status after it.
 
+A study is a module of experiments/studies with a function `study`. The type of its first parameter says what it runs:
+`Trials` are rows on the workers and need --simulated, a `Session` is a robot with its operator, or a simulated one.
+A study on rows may have a second function, `robot`, which takes a Session and runs without --simulated. A study of
+files has them as unnamed arguments, and no robot. A module with HAS_ROBOT = False has an operator and no robot.
+
 An interrupted experiment stops its robot first. Its folder holds the trials that it measured, and the same command
 continues from there. Every report carries what computed it.
 """
 
 import argparse
-import json
+import json as json_text  # `json` is an option
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, get_type_hints
 
 from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.function_options import flag_of, given_options
 from command_line.json_output import print_value
-from command_line.options.studies import has_files, takes_session
 from command_line.screen import Progress, complain
+from command_line.shared_options import Json, Socket
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
-from experiments.study.catalogue import load_study
+from experiments.study.catalogue import load_study, study_texts
 from experiments.study.notebook import NotebookError, count_entries, plan_in
-from experiments.study.option import OptionError, declared_options
+from experiments.study.option import Option, OptionError, declared_options
 from experiments.study.prompt import AutomaticOperator
 from experiments.study.provenance import identity, provenance
 from experiments.study.results_folder import (
@@ -36,6 +43,7 @@ from experiments.study.results_folder import (
     set_aside,
 )
 from experiments.study.session import Ending, Session
+from experiments.study.values import folder
 from experiments.study.workers import LocalWorkers, Workers, WorkersError
 from firmware_host.configuration.file_problems import why_not
 from operator_client.status_client import CallRefusedError
@@ -46,13 +54,50 @@ Values = dict[str, Any]
 Function = Callable[..., Any]
 
 
-def run_study(options: argparse.Namespace) -> int:
-    """Run the study that the command line names."""
+class StudyCommand:
+    """The command of one study."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def functions(self) -> Iterator[Function]:
+        """Yield the functions that declare its options: its own, and those of this module that it needs."""
+        with suppress(ModuleNotFoundError):  # of an extra; the command itself says which
+            module = load_study(self.name)
+            own = [module.study, *filter(None, [getattr(module, "robot", None)])]
+            yield from own
+            if not has_files(module.study):
+                yield chosen_function
+            if any(map(takes_session, own)) and getattr(module, "HAS_ROBOT", True):
+                yield make_session
+            if not takes_session(module.study):
+                yield make_workers
+        yield write_page
+        yield open_folder
+
+    def run(self, options: argparse.Namespace) -> int:
+        return run_study(self.name, options)
+
+
+CALIBRATE = StudyCommand("calibrate")  # which is a command of its own
+STUDIES = {name: (StudyCommand(name), text) for name, text in study_texts().items()}
+
+
+def takes_session(function: Function) -> bool:
+    return get_type_hints(function)[next(iter(signature(function).parameters))] is Session
+
+
+def has_files(function: Function) -> bool:
+    return not all(option.named for option in declared_options(function))
+
+
+def run_study(name: str, options: argparse.Namespace) -> int:
+    """Run a study with the options that its functions declare."""
     for module in NEEDED:  # they are reported before the hours of measuring
         if find_spec(module) is None:
             raise ModuleNotFoundError(name=module)
     try:
-        return _conduct(options, load_study(options.name))
+        return _conduct(name, options, load_study(name))
     except (OptionError, argparse.ArgumentTypeError) as problem:
         complain(str(problem))
         return exit_codes.USAGE
@@ -61,20 +106,20 @@ def run_study(options: argparse.Namespace) -> int:
         return exit_codes.REFUSED
 
 
-def _conduct(options: argparse.Namespace, module: ModuleType) -> int:
-    function = _chosen(options, module)
+def _conduct(name: str, options: argparse.Namespace, module: ModuleType) -> int:
+    function = chosen_function(module, options, **given_options(options, chosen_function))
     values = given_options(options, function)
     defaults = {each.parameter: each.default for each in declared_options(function)}
-    simulated = {"simulated": options.simulated} if "simulated" in options else {}
+    simulated = {} if has_files(module.study) else {"simulated": False} | given_options(options, chosen_function)
     # every option that the results depend on, as JSON has it
-    typed = json.loads(json.dumps(defaults | values | simulated, default=str))
+    typed = json_text.loads(json_text.dumps(defaults | values | simulated, default=str))
     program = identity(module.__name__)  # reads the sources before minutes of work, in which they may change
-    is_new = options.out is None or not options.out.exists()
     files: ResultFiles = getattr(module, "FILES", USUAL)
-    results = _open_folder(options, typed, getattr(module, "folder_name", lambda **_: "")(**values), files)
+    called = getattr(module, "folder_name", lambda **_: "")(**values)
+    results, is_new = open_folder(name, called, typed, files, **given_options(options, open_folder))
     before = count_entries(results) if (results / files.page).exists() else None
     try:
-        status = _run(options, module, partial(function, **values), results, program, typed)
+        status = _run(name, options, module, partial(function, **values), results, program, typed)
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
         status = _end_early(results, problem)
     finally:
@@ -85,71 +130,99 @@ def _conduct(options: argparse.Namespace, module: ModuleType) -> int:
     return status
 
 
-def _chosen(options: argparse.Namespace, module: ModuleType) -> Function:
+def chosen_function(
+    module: ModuleType,
+    options: argparse.Namespace,
+    *,
+    simulated: Annotated[bool, Option("robot and muds are simulated")] = False,
+) -> Function:
     """Return the function that runs. Raises OptionError for options of the other one."""
     study: Function = module.study
     robot: Function | None = getattr(module, "robot", None)
-    if has_files(study) or takes_session(study) or (robot is None and options.simulated):
+    if has_files(study) or takes_session(study) or (robot is None and simulated):
         return study
     if robot is None:
         raise OptionError("robot and muds are those of the simulator: this experiment runs with --simulated only")
-    chosen, other = (study, robot) if options.simulated else (robot, study)
+    chosen, other = (study, robot) if simulated else (robot, study)
     foreign = given_options(options, other).keys() - given_options(options, chosen).keys()
-    if not options.simulated and (options.workers or options.cluster):
-        foreign |= {"workers"} if options.workers else {"cluster"}
+    if not simulated:
+        foreign |= given_options(options, make_workers).keys()
     if foreign:
-        where = "without --simulated" if options.simulated else "with --simulated"
+        where = "without --simulated" if simulated else "with --simulated"
         raise OptionError(f"{flag_of(min(foreign))} can only be given {where}")
     return chosen
 
 
-def _open_folder(options: argparse.Namespace, typed: Values, name: str, files: ResultFiles) -> Path:
-    """Return the folder of the results: without --out a new one. Raises NotebookError, OSError.
+def open_folder(
+    name: str,
+    called: str,
+    typed: Values,
+    files: ResultFiles,
+    *,
+    out: Annotated[
+        Path | None,
+        Option("for the results; continues there (default: a new mudskipper-NAME)", metavar="DIR", parse=folder),
+    ] = None,
+    restart: Annotated[bool, Option("begin again in that folder; its earlier results are kept as DIR-old")] = False,
+) -> tuple[Path, bool]:
+    """Return the folder of the results, and whether it is new: without `out` it is. Raises NotebookError, OSError.
 
     A finished study continues with options other than `typed`, such as more trials.
     """
-    if options.out is None:
-        return make_folder(f"mudskipper-{name or options.name}")
-    folder: Path = options.out.resolve() if options.restart else options.out  # the working directory moves too
-    if options.restart and (old := set_aside(folder)):
+    if out is None:
+        return make_folder(f"mudskipper-{called or name}"), True
+    is_new = not out.exists()
+    results = out.resolve() if restart else out  # the working directory moves too
+    if restart and (old := set_aside(results)):
         print(f"the earlier results are in {old} now", file=sys.stderr)
-    require_unfinished(folder, options.name, typed, files)
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    require_unfinished(results, name, typed, files)
+    results.mkdir(parents=True, exist_ok=True)
+    return results, is_new
 
 
 def _run(
+    name: str,
     options: argparse.Namespace,
     module: ModuleType,
-    function: Callable[..., Any],
+    function: partial[Any],
     results: Path,
     program: Mapping[str, str],
     typed: Values,
 ) -> int:
-    from experiments.study.page import write_result  # matplotlib and pandas are slow to import
-    from experiments.study.trials import Trials
+    from experiments.study.trials import Trials  # matplotlib and pandas are slow to import
 
     progress = Progress("trials")
     trials: Trials | None = None
     try:
-        if takes_session(function.func):  # type: ignore[attr-defined]
-            result = function(_session_in(options, results, progress, program))
+        if takes_session(function.func):
+            given = {"simulated": typed.get("simulated", False), "socket": None} | given_options(options, make_session)
+            result = function(make_session(results, progress, program, **given))
         else:
-            plan = {"experiment": options.name, "simulated": True, **program}
-            trials = Trials(results, plan, progress.show, _workers_of(options))
+            plan = {"experiment": name, "simulated": True, **program}
+            workers = make_workers(**given_options(options, make_workers))
+            trials = Trials(results, plan, progress.show, workers)
             result = function(trials)
     finally:
         progress.clear()
-    simulated = " (simulated)" if typed.get("simulated") else ""
-    result = replace(result, title=f"{result.title or f'Experiment: {options.name}'}{simulated}")
+    simulated = {key: value for key, value in typed.items() if key == "simulated"}
+    marked = " (simulated)" if simulated.get("simulated") else ""
+    result = replace(result, title=f"{result.title or f'Experiment: {name}'}{marked}")
     report = (
-        {"schema": f"experiment-{options.name}/{getattr(module, 'SCHEMA', 1)}", "experiment": options.name}
+        {"schema": f"experiment-{name}/{getattr(module, 'SCHEMA', 1)}", "experiment": name}
         | result.json()
-        | ({"simulated": typed["simulated"]} if "simulated" in typed else {})
+        | simulated
         | {"provenance": provenance(module.__name__) | {"options": typed, "plan": plan_in(results)}}
     )
-    written = write_result(results, result, report, trials.measured if trials else ())
-    if options.json:
+    rows = trials.measured if trials else ()
+    return write_page(results, result, report, rows, **given_options(options, write_page))
+
+
+def write_page(results: Path, result: Any, report: Values, rows: Any, *, json: Json = False) -> int:
+    """Write page, pictures and numbers, print what was found, and return the exit status."""
+    from experiments.study.page import write_result  # matplotlib and pandas are slow to import
+
+    written = write_result(results, result, report, rows)
+    if json:
         print_value(report)
     else:
         print(result.text())
@@ -157,20 +230,33 @@ def _run(
     return EXIT_STATUS[result.ending]
 
 
-def _session_in(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
+def make_session(
+    results: Path, progress: Progress, program: Mapping[str, str], simulated: bool, *, socket: Socket
+) -> Session:
+    """Return the surroundings of a run; `socket` is None where there is no robot."""
     prompt = TerminalPrompt(progress.clear)
-    if options.simulated:
+    if simulated:
         operator = AutomaticOperator(prompt.report)
-        return Session(folder, operator, progress.show, simulated=True, program=program)
-    return Session(folder, prompt, progress.show, getattr(options, "socket", None), program=program)
+        return Session(results, operator, progress.show, simulated=True, program=program)
+    return Session(results, prompt, progress.show, socket, program=program)
 
 
-def _workers_of(options: argparse.Namespace) -> Workers:
-    if options.cluster:
+def make_workers(
+    *,
+    workers: Annotated[
+        int | None,
+        Option("processes here (default: one for each processor)", low=1, high=1000, alternative="workers"),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        Option("of a Dask scheduler, whose workers run the trials instead", metavar="ADDRESS", alternative="workers"),
+    ] = None,
+) -> Workers:
+    if cluster:
         from experiments.study.cluster_workers import ClusterWorkers  # distributed is slow to import, and an extra
 
-        return ClusterWorkers(options.cluster)
-    return LocalWorkers(options.workers)
+        return ClusterWorkers(cluster)
+    return LocalWorkers(workers)
 
 
 def _end_early(folder: Path, problem: BaseException) -> int:

@@ -12,9 +12,7 @@ from typing import Any
 import foxglove
 from foxglove import Channel, Schema
 
-from command_line.live.ros_definitions import full_definition, schema_name
-from command_line.live.ros_messages import TOPICS
-from command_line.live.standard_messages import StandardMessages
+from command_line.live.standard_messages import ROS, TOPICS, StandardMessages
 from control.geometry import FlipperGeometry
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
@@ -33,7 +31,7 @@ class ViewerServer:
         self.port = self._server.port
         self._channels: dict[str, Channel] = {}
         for topic, message in TOPICS.items():
-            self._add_channel(topic, schema_name(message), full_definition(message))
+            self._add_channel(topic, message, ROS.generate_msgdef(message, ros_version=2)[0])
         self._standard = StandardMessages(FlipperGeometry())
 
     def _add_channel(self, topic: str, name: str, definition: str) -> None:

@@ -10,14 +10,13 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.operation.mode_output import print_mode
+from command_line.robot_text import MILD, position_text, stride_text
 from command_line.screen import complain
-from experiments.reports.text_tables import number
 from operator_client.status_client import CallRefusedError, StatusClient
 
 LEASE_S = 1.0
 RENEWAL_S = 0.2
 MOVING = ("walking", "stopping", "damping")
-MILD = ("none", "warn")  # reactions that do not end a walk
 
 
 def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
@@ -70,11 +69,9 @@ class LiveLine:
         self._shown = ""
 
     def show(self, report: dict[str, Any], hint: str = "Ctrl-C stops") -> None:
-        summary = f"{report['mode']}, stride {report['stride']}"
+        summary = f"{report['mode']}, {stride_text(report)}"
         if self._live:
-            depth_cm, x_m = 100.0 * report["depth_m"], number(report["body_x_m"])
-            text = f"{summary}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; {hint}"
-            print(f"\r\033[K{text}", end="", flush=True)
+            print(f"\r\033[K{summary}, {position_text(report)}; {hint}", end="", flush=True)
         elif summary != self._shown and not self._silent:
             print(summary, flush=True)
         self._shown = summary

@@ -7,22 +7,38 @@ import argparse
 import time
 from collections.abc import Callable
 from contextlib import closing, suppress
-from math import degrees, isfinite, radians
+from math import isfinite, radians
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.drive_state import POWER_CUT, mode_word, supply_text, torque_state
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
-from command_line.operation.attended_walk import MILD, attend
+from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured, complain
+from command_line.robot_text import (
+    MILD,
+    MODE_STYLES,
+    WARNING,
+    Part,
+    Report,
+    cause_text,
+    consequences_text,
+    drive_cells,
+    machine_lines,
+    mode_word,
+    notices,
+    plain,
+    position_text,
+    stride_text,
+    style_of,
+    unheard_text,
+)
+from command_line.screen import GREEN, RED, coloured, complain
 from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
 from control.computing.suggestion import suggestion
 from drivers.can.run_folder import find_run_folder
-from experiments.reports.counted_nouns import counted
-from experiments.reports.text_tables import number, table
+from experiments.reports.text_tables import table
 from experiments.study.option import Option
 from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, StatusClient
 
@@ -32,16 +48,6 @@ WAITING_S = 30.0
 BEYOND_RANGE = "joint_position"  # a fault
 LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
-MODE_COLOURS = {
-    "fault": RED,
-    "damping": RED,
-    POWER_CUT: RED,
-    "walking": GREEN,
-    "hold": GREEN,
-    "stopping": YELLOW,
-    "arming": YELLOW,
-}
-
 
 TakeOver: TypeAlias = Annotated[bool, Option("take the lease from a program that holds it")]
 
@@ -173,7 +179,7 @@ def clear(
     return exit_codes.OK
 
 
-def _reset_advice(socket: Path, report: dict[str, Any]) -> str:
+def _reset_advice(socket: Path, report: Report) -> str:
     """Return how a joint beyond its range is moved back: by hand, or by the simulation that this socket belongs to."""
     if all(fault["name"] != BEYOND_RANGE for fault in stopping_faults(report)):
         return ""
@@ -183,7 +189,7 @@ def _reset_advice(socket: Path, report: dict[str, Any]) -> str:
     return f" 'mudskipper simulate --reset{named}' moves it back, then 'mudskipper clear'"
 
 
-def _is_at_rest(report: dict[str, Any]) -> bool:
+def _is_at_rest(report: Report) -> bool:
     return report["mode"] in ("idle", "boot")
 
 
@@ -191,7 +197,7 @@ def _refusal(message: str) -> CommandError:
     return CommandError(message, status=exit_codes.REFUSED)
 
 
-def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
+def stopping_faults(report: Report) -> list[Report]:
     """Return the active faults that are more than a warning."""
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
@@ -227,7 +233,7 @@ def _call_patiently(client: StatusClient, command: str, params: dict[str, Any], 
             time.sleep(POLL_S)
 
 
-def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_s: float) -> dict[str, Any]:
+def _poll(client: StatusClient, done: Callable[[Report], bool], longest_s: float) -> Report:
     """Return the first status that is `done`, or the last one after `longest_s`."""
     deadline_s = time.monotonic() + longest_s
     while not done(report := client.call("status")) and time.monotonic() < deadline_s:
@@ -260,7 +266,7 @@ def check(
     return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
 
 
-def _check_text(item: dict[str, Any], following: list[str]) -> str:
+def _check_text(item: Report, following: list[str]) -> str:
     """Format one item, and name those that follow from it."""
     mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
     lines = [f"{mark} {item['id']:24} {item['text']}"]
@@ -272,100 +278,25 @@ def _check_text(item: dict[str, Any], following: list[str]) -> str:
     return "\n".join(lines)
 
 
-def status_text(report: dict[str, Any]) -> str:
-    mode = coloured(mode_word(report), MODE_COLOURS.get(mode_word(report), BOLD))
-    stride = "no stride" if report["stride"] < 0 else f"stride {report['stride']}"
-    lines = [f"{report['robot']}: {mode}, {stride}, {report['phase']}"]
-    lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
+def status_text(report: Report) -> str:
+    style = MODE_STYLES.get(mode_word(report), "bold")
+    position = f"{stride_text(report)}, {position_text(report)}"
+    parts: list[Part] = [(f"{report['robot']}: ", ""), (mode_word(report), style), (f", {position}\n", "")]
     if report["mode"] == "boot":
-        lines.append(_boot_line(report["drives"]))
-    lines += [_cause_text(cause) for cause in report["causes"]]
-    if report["lease"]:
-        lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
-    notices = [f"{clock_text(report['notice_age_s'])} {report['notice']}"] if report["notice"] else []
-    if report["forced"]:
-        notices.append("armed by 'mudskipper arm --force' against a failed check: see 'mudskipper check'")
-    if report["pose"]["trouble"]:
-        notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
-    lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
-    lines += ["", _drives_table(report["drives"]), "", _loop_text(report)]
-    return "\n".join(lines)
+        parts.append((f"{unheard_text(report) or 'every drive was heard'}\n", WARNING))
+    for cause in report["causes"]:
+        consequences = consequences_text(cause)
+        lines = [cause_text(cause), *filter(None, [consequences and f"    and {consequences}"])]
+        parts.append(("\n".join([*lines, f"    -> {cause['what_to_do']}\n"]), style_of(cause)))
+    parts += [(f"warning: {notice}\n", WARNING) for notice in notices(report)]
+    drives = [{head: cell for head, (cell, _) in drive_cells(drive).items()} for drive in report["drives"]]
+    parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
+    for name, (text, style) in machine_lines(report):
+        parts += [(f"\n{name:7}", ""), (text, style)]
+    return plain(parts) + _quota_line(report["log"])
 
 
-def _boot_line(drives: list[dict[str, Any]]) -> str:
-    signals = ("angle_age_s", "current_age_s", "heartbeat_age_s")
-    unheard = [drive["joint"] for drive in drives if any(drive[signal] is None for signal in signals)]
-    return coloured(f"not heard yet: {', '.join(unheard) or 'none'}; 'mudskipper check' says what to do", YELLOW)
-
-
-def _cause_text(cause: dict[str, Any]) -> str:
-    colour = YELLOW if cause["reaction"] in MILD else RED
-    against = ", prevents arming" if cause["blocks_arming"] else ""
-    lines = [f"{cause['name']} ({cause['reaction'].replace('_', ' ')}{against}): {cause['message']}"]
-    if cause["consequences"]:
-        lines.append(f"    and {counted(len(cause['consequences']), 'fault')} as its consequence")
-    return coloured("\n".join([*lines, f"    -> {cause['what_to_do']}"]), colour)
-
-
-def _drives_table(drives: list[dict[str, Any]]) -> str:
-    rows = [
-        (
-            "joint",
-            "angle (°)",
-            "current (A)",
-            "torque (N·m)",
-            "motor (°C)",
-            "supply (V)",
-            "(A)",
-            "age (ms)",
-            "torque",
-            "errors",
-        )
-    ]
-    for drive in drives:
-        angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
-        rows.append(
-            (
-                drive["joint"],
-                number(None if angle_rad is None else degrees(angle_rad), 1),
-                number(drive["current_a"], 2),
-                number(drive["torque_command_nm"], 3),
-                number(drive["temperature_c"], 0),
-                number(drive["bus_voltage_v"], 1),
-                number(drive["bus_current_a"], 1),
-                number(None if age_s is None else 1e3 * age_s, 1),
-                torque_state(drive),
-                drive["errors"] or "-",
-            )
-        )
-    return table(rows)
-
-
-def _loop_text(report: dict[str, Any]) -> str:
-    loop, bus, log = report["loop"], report["bus"], report["log"]
-    late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
-    poses = f"{pose['source']}: {pose['poses']} poses, {pose['malformed']} malformed, {pose['lost']} without the body"
-    return "\n".join(
-        (
-            f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
-            f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
-            f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst,"
-            f" {'compiled' if report.get('compiled') else 'interpreted'}",
-            f"bus    {bus['unknown_frames']} unknown, {bus['malformed_frames']} malformed,"
-            f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
-            + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
-            + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
-            f"supply {supply_text(report)}",
-            f"pose   {poses if pose['source'] else 'none'}",
-            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
-            + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")
-            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else "")
-            + _quota_line(log),
-        )
-    )
-
-
-def _quota_line(log: dict[str, Any]) -> str:
+def _quota_line(log: Report) -> str:
     """Return what the quota deletes; empty where there is no log or the daemon is older."""
     if not log["path"] or "quota_bytes" not in log:
         return ""

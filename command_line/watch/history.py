@@ -6,33 +6,31 @@ computer's monotonic clock, which the daemon shares.
 
 import time
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from itertools import islice, takewhile
+from typing import NamedTuple
 
+from command_line.robot_text import Report
 from command_line.screen import clock_text
 
-FORCES = ("force_x_n", "force_z_n")
-MOST_SAMPLES = 400  # of a force: as many as the widest terminal shows
 MOST_STRIDES = 400  # of single flippers
-MOST_JOINT_SAMPLES = 18000  # half an hour at ten a second, 3 MB a joint
+MOST_SAMPLES = 18000  # half an hour at ten a second, 3 MB a joint
 SPEED_S = 4.0  # over which the speed is averaged: one to two strides
 SILENT_S = 1.0  # without an answer until the screen says so
+Values = tuple[float | None, ...]  # of the joints or the flippers; None is unknown
 
-Report = dict[str, Any]
 
-
-class JointSample(NamedTuple):
-    """What one status or row says of all joints; None is unknown."""
+class Sample(NamedTuple):
+    """What one status or row says of all joints and flippers."""
 
     time_s: float  # of the loop's clock
-    angle_rad: tuple[float | None, ...]
-    current_a: tuple[float | None, ...]
-    torque_command_nm: tuple[float | None, ...]
-
-
-class Position(NamedTuple):
-    time_s: float
-    x_m: float
+    body_x_m: float | None
+    angle_rad: Values
+    current_a: Values
+    torque_command_nm: Values
+    force_x_n: Values
+    force_z_n: Values
 
 
 @dataclass
@@ -45,9 +43,7 @@ class History:
     problem: str = ""
     strides: deque[Report] = field(default_factory=lambda: deque(maxlen=MOST_STRIDES))
     next_stride: int = 0  # the number of the first stride not heard of
-    forces: dict[str, deque[float | None]] = field(default_factory=dict)  # by flipper and FORCES
-    positions: deque[Position] = field(default_factory=deque)
-    joints: deque[JointSample] = field(default_factory=lambda: deque(maxlen=MOST_JOINT_SAMPLES))
+    samples: deque[Sample] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
 
     def add_status(self, report: Report, now_s: float, from_row: bool = False) -> None:
         """Take in a status; `from_row`: only the values of a newer row are newer than the last one."""
@@ -56,21 +52,10 @@ class History:
         if not from_row:
             self.asked_s = now_s
         self.status, self.heard_s, self.problem = report, now_s, ""
-        for flipper in self.flippers:
-            for force in FORCES:
-                samples = self.forces.setdefault(f"{flipper} {force}", deque(maxlen=MOST_SAMPLES))
-                samples.append(report["loads"][flipper][force])
-        signals = (tuple(drive[name] for drive in report["drives"]) for name in JointSample._fields[1:])
-        self.joints.append(JointSample(report["now_s"], *signals))
-        if report["body_x_m"] is not None:
-            self.positions.append(Position(report["now_s"], report["body_x_m"]))
-        while self.positions and self.positions[0].time_s < report["now_s"] - SPEED_S:
-            self.positions.popleft()
-
-    @property
-    def flippers(self) -> list[str]:
-        """The names of the robot's flippers."""
-        return list(self.status["loads"])
+        joints, flippers = report["drives"], report["loads"].values()
+        signals = (tuple(joint[name] for joint in joints) for name in Sample._fields[2:5])
+        forces = (tuple(flipper[name] for flipper in flippers) for name in Sample._fields[5:])
+        self.samples.append(Sample(report["now_s"], report["body_x_m"], *signals, *forces))
 
     def add_strides(self, strides: list[Report]) -> None:
         for stride in strides:
@@ -80,7 +65,6 @@ class History:
     def forget(self) -> None:
         """Forget the strides: another daemon counts its own."""
         self.strides.clear()
-        self.positions.clear()
         self.next_stride = 0
 
     def clock_text(self, age_s: float) -> str:
@@ -95,13 +79,24 @@ class History:
     def of(self, flipper: str) -> list[Report]:
         return [stride for stride in self.strides if stride["flipper"] == flipper]
 
+    def forces_n(self, flipper: int, name: str, count: int) -> list[float | None]:
+        """Return the last forces on a flipper, the newest last."""
+        return [getattr(sample, name)[flipper] for sample in islice(reversed(self.samples), count)][::-1]
+
+    def _recent(self) -> Iterator[tuple[float, float]]:
+        """Yield time and position of the last seconds, the newest first."""
+        since_s = self.status["now_s"] - SPEED_S
+        for sample in takewhile(lambda sample: sample.time_s >= since_s, reversed(self.samples)):
+            if sample.body_x_m is not None:
+                yield sample.time_s, sample.body_x_m
+
     @property
     def speed_m_s(self) -> float | None:
-        if len(self.positions) < 2:
+        positions = list(self._recent())
+        if len(positions) < 2:
             return None
-        first, last = self.positions[0], self.positions[-1]
-        elapsed_s = last.time_s - first.time_s
-        return (last.x_m - first.x_m) / elapsed_s if elapsed_s > 0.0 else None
+        (last_s, last_m), (first_s, first_m) = positions[0], positions[-1]
+        return (last_m - first_m) / (last_s - first_s) if last_s > first_s else None
 
     @property
     def step_m(self) -> float | None:

@@ -22,7 +22,7 @@ class Signal(NamedTuple):
     """A signal of the joints."""
 
     title: str
-    field: str  # of a JointSample
+    field: str  # of a Sample
     shown: Callable[[float], float]  # in the unit of the title
     floor: float  # the smallest range that fills the height, in that unit
 
@@ -48,7 +48,7 @@ class View:
 
     def scroll(self, columns: float, history: History) -> None:
         """Move the window; at the newest sample it follows the time again."""
-        first_s, last_s = history.joints[0].time_s, history.joints[-1].time_s
+        first_s, last_s = history.samples[0].time_s, history.samples[-1].time_s
         end_s = max((self.end_s or last_s) + columns * self.column_s, first_s)
         self.end_s = None if end_s >= last_s else end_s
 
@@ -56,7 +56,7 @@ class View:
         """Return a plot for each joint, above the time of day at both ends."""
         signal, columns = SIGNALS[self.signal], max(width - NAME - RANGE - 1, 1)
         names = [drive["joint"] for drive in history.status["drives"]]
-        end_s = history.joints[-1].time_s if self.end_s is None else self.end_s
+        end_s = history.samples[-1].time_s if self.end_s is None else self.end_s
         begin_s = end_s - columns * self.column_s
         parts = [(f"{signal.title}\n", "bold")]
         lines = max((height - 2) // len(names), 2)
@@ -70,7 +70,7 @@ class View:
         """Return the values of each joint: in each column the one of largest magnitude, or None where nothing came."""
         signal = SIGNALS[self.signal]
         found: list[list[float | None]] = [[None] * columns for _ in history.status["drives"]]
-        for sample in reversed(history.joints):
+        for sample in reversed(history.samples):
             column = int((sample.time_s - begin_s) / self.column_s) if sample.time_s >= begin_s else -1
             if column < 0:
                 break

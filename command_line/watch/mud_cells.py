@@ -1,4 +1,4 @@
-"""What the robot feels, as cells and texts: its coefficients, its strides, and the mud along its path."""
+"""What the robot feels, as cells and texts: its coefficients, its strides, forces, and the mud along its path."""
 
 from collections.abc import Sequence
 from itertools import accumulate
@@ -7,13 +7,15 @@ from typing import Any
 
 from rich.text import Text
 
+from command_line.robot_text import OLD, at_depth, cm, is_stale
 from command_line.screen import coefficient
 from command_line.watch.bars import BARS, bars
 from command_line.watch.history import History
 from experiments.reports.text_tables import number
-from experiments.reports.value_text import N_CM3, value_text
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
+FORCES = {"forward": "force_x_n", "up": "force_z_n"}
+LEAST_FORCE_N = 2.0  # that fills the height of its curve: noise looks like noise
 TREND = 6  # strides that the trend shows
 SIGNIFICANT = 2.0  # standard errors that a change must exceed
 PIECE_M = 0.05  # of the mud along the path
@@ -36,17 +38,15 @@ def coefficient_rows(history: History, flippers: Sequence[str]) -> list[Row]:
 
 def _coefficient(history: History, flipper: str, name: str) -> Row:
     estimate = history.status["mud"].get(flipper, {}).get(name)
+    is_known = estimate and estimate["value"] is not None
     readings = [stride[name] for stride in history.of(flipper)][-TREND:]
-    values = [reading["value"] for reading in readings if reading["valid"]]
-    text, style = "-", ""
-    if estimate and estimate["value"] is not None:
-        style = BOUND if estimate["at_least"] else ""
-        bound = "≥ " if estimate["at_least"] else ""
-        text = bound + value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-        text += f" at {100.0 * estimate['depth_m']:.1f} cm"
-    errors = [reading["repeatability"] or 0.0 for reading in readings if reading["valid"]]
-    last = Text(bars(values, 2.0 * SIGNIFICANT * max(errors, default=0.0))[0], "cyan")
-    return [right(text, style), Text(trend(readings), "bold", justify="center"), last]
+    valid = [reading for reading in readings if reading["valid"]]
+    floor = 2.0 * SIGNIFICANT * max((reading["repeatability"] or 0.0 for reading in valid), default=0.0)
+    return [
+        right(at_depth(estimate), BOUND if estimate["at_least"] else "") if is_known else right("-"),
+        Text(trend(readings), "bold", justify="center"),
+        Text(bars([reading["value"] for reading in valid], floor)[0], "cyan"),
+    ]
 
 
 def trend(readings: Sequence[Report]) -> str:
@@ -62,6 +62,23 @@ def trend(readings: Sequence[Report]) -> str:
     return "↗" if change > 0.0 else "↘"
 
 
+def force_text(history: History, width: int) -> Text:
+    """Return a line for each direction of the force: the curve of the last seconds on each flipper, and the newest."""
+    flippers = list(history.status["loads"])
+    room = max(width // len(flippers) - 19, 0)
+    lines = []
+    for direction, name in FORCES.items():
+        line = Text()
+        for index, flipper in enumerate(flippers):
+            samples_n = history.forces_n(index, name, max(room, 1))
+            stale = any(is_stale(each) for each in history.status["drives"] if each["joint"].startswith(flipper))
+            line.append(f"{direction:8}", "bold")
+            line.append(bars(samples_n, LEAST_FORCE_N)[0][:room].rjust(room), OLD if stale else "cyan")
+            line.append(f"{number(samples_n[-1], 1):>7} N  ", OLD if stale else "")
+        lines.append(line)
+    return Text("\n", no_wrap=True, overflow="crop").join(lines)
+
+
 def stride_rows(history: History) -> list[Row]:
     """Return a row for each stride that is remembered, the newest first."""
     return [
@@ -69,15 +86,11 @@ def stride_rows(history: History) -> list[Row]:
             right(f"{stride['index']}"),
             Text(f" {stride['flipper']}"),
             *(right(coefficient(stride[name])) for name in COEFFICIENTS),
-            *(right(cm(stride[name], 1)) for name in ("depth_m", "chosen_depth_m")),
-            right(cm(stride["step_m"], 1)) if stride["released"] else right("stuck", "bold red"),
+            *(right(cm(stride[name])) for name in ("depth_m", "chosen_depth_m")),
+            right(cm(stride["step_m"])) if stride["released"] else right("stuck", "bold red"),
         ]
         for stride in reversed(history.strides)
     ]
-
-
-def cm(value_m: float | None, digits: int) -> str:
-    return number(None if value_m is None else 100.0 * value_m, digits)
 
 
 def strip_text(history: History, width: int, names: Sequence[str]) -> Text:
@@ -96,9 +109,7 @@ def strip_text(history: History, width: int, names: Sequence[str]) -> Text:
         scale.pad_right(max(0, cell + 1 - len(scale)))
         scale = Text.assemble(scale[:cell], ("▲", "bold"), scale[cell + 1 :])
     rows = [Text.assemble((f"mud {name} ", "bold"), *_blocks(history, name, first, last, cells)) for name in names]
-    lines = Text("\n").join([*rows, Text.assemble("        ", scale)])
-    lines.no_wrap, lines.overflow = True, "crop"
-    return lines
+    return Text("\n", no_wrap=True, overflow="crop").join([*rows, Text.assemble("        ", scale)])
 
 
 def _blocks(history: History, name: str, first: int, last: int, cells: int) -> list[tuple[str, str]]:

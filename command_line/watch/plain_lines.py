@@ -1,13 +1,11 @@
 """The status as one line of text after another, for pipes and for terminals that cannot show the screen."""
 
 import time
-from typing import Any
 
+from command_line.robot_text import at_depth, consequences_text, position_text, stride_text
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
 from experiments.reports.counted_nouns import counted
-from experiments.reports.text_tables import number
-from experiments.reports.value_text import N_CM3, value_text
 
 
 def print_lines(feed: Feed, period_s: float) -> None:
@@ -25,24 +23,11 @@ def plain_line(history: History, now_s: float) -> str:
     if history.problem:
         return f"nothing heard for {history.silence_s(now_s):.1f} s, torque unknown: {history.problem}"
     report = history.status
-    texts = [report["mode"]]
-    if report["mode"] in ("walking", "stopping"):
-        texts += [f"stride {report['stride']}", report["phase"], f"depth {100.0 * report['depth_m']:.1f} cm"]
-    texts.append(f"body {number(report['body_x_m'])} m")
-    texts += [_coefficient(report, name) for name in ("k_p", "k_s", "k_e") if report["mud"][name]]
-    return f"{', '.join(texts)}{_alarm(report['causes'])}"
-
-
-def _coefficient(report: dict[str, Any], name: str) -> str:
-    estimate = report["mud"][name]
-    bound = "≥ " if estimate["at_least"] else ""
-    value = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    return f"{name} {bound}{value} at {100.0 * estimate['depth_m']:.1f} cm"
-
-
-def _alarm(causes: list[dict[str, Any]]) -> str:
-    if not causes:
-        return ""
-    following = counted(len(causes[0]["consequences"]), "consequence")
-    more = f", {counted(len(causes) - 1, 'other cause')}" if causes[1:] else ""
-    return f" | {causes[0]['message']} ({following}{more}) -> {causes[0]['what_to_do']}"
+    known = [f"{name} {at_depth(report['mud'][name])}" for name in ("k_p", "k_s", "k_e") if report["mud"][name]]
+    line = ", ".join([report["mode"], stride_text(report), position_text(report), *known])
+    if not report["causes"]:
+        return line
+    cause, *others = report["causes"]
+    notes = [consequences_text(cause), counted(len(others), "other cause") if others else ""]
+    rest = ", ".join(filter(None, notes))
+    return f"{line} | {cause['message']}{f' ({rest})' if rest else ''} -> {cause['what_to_do']}"

@@ -12,24 +12,29 @@ from typing import Any
 from rich.text import Text
 from textual.app import App, ComposeResult, ScreenStackError
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Vertical, VerticalScroll
 from textual.css.query import NoMatches
 from textual.events import Key
-from textual.widgets import ContentSwitcher, DataTable, Footer, Label, RichLog, Static
+from textual.widgets import ContentSwitcher, DataTable, Footer, RichLog, Static
 
 from command_line import exit_codes
-from command_line.drive_state import is_stale
 from command_line.operation.confirmation import TORQUE_UNKNOWN
-from command_line.watch.bars import bars
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
 from command_line.watch.joint_plots import SIGNALS, View
-from command_line.watch.machine_cells import BADGES, alarm_text, drive_rows, faults_text, machine_text, walk_text
-from command_line.watch.mud_cells import COEFFICIENTS, coefficient_rows, stride_rows, strip_text
-from experiments.reports.text_tables import number
+from command_line.watch.mud_cells import COEFFICIENTS, coefficient_rows, force_text, stride_rows, strip_text
+from command_line.watch.robot_cells import (
+    DRIVE_COLUMNS,
+    alarm_text,
+    badge,
+    drive_rows,
+    faults_text,
+    machine_text,
+    walk_text,
+)
 
 ALARM_S = 15.0
-ROOMY_ROWS = 36  # from here on the panels are apart
+ROOMY_ROWS = 42  # from here on the panels are apart
 QUESTIONS = {
     "arm": "Arm the robot? It holds its pose with torque.",
     "walk": "Let the robot walk until it is stopped?",
@@ -65,11 +70,6 @@ Values in italics are old. Torque is unknown where a drive is silent."""
 STRIDE_COLUMNS = (
     ("no", 3), ("flipper", 8), *((name, 17) for name in COEFFICIENTS), ("depth", 6), ("next", 6), ("step", 6),
 )  # fmt: skip
-DRIVE_COLUMNS = (
-    ("drive", 16), ("angle", 9), ("current / limit", 18), ("motor", 8), ("age", 9), ("torque", 9), ("", 40),
-)  # fmt: skip
-FORCES = {"forward": "force_x_n", "up": "force_z_n"}
-LEAST_FORCE_N = 2.0  # that fills the height of its curve: noise looks like noise
 
 
 class Rows(DataTable[Any]):
@@ -80,7 +80,7 @@ class Rows(DataTable[Any]):
         super().__init__(cursor_type="none", cell_padding=0, id=name)
         self.can_focus = False
         for head, width in columns:
-            self.add_column(Text(head, justify="left" if head == "drive" else "right"), width=width)
+            self.add_column(Text(head, justify="left" if head == "joint" else "right"), width=width)
 
     def show(self, rows: Sequence[Sequence[Any]]) -> None:
         if len(rows) != self.row_count:
@@ -94,27 +94,6 @@ class Rows(DataTable[Any]):
                     self.update_cell_at((y, x), cell)  # type: ignore[arg-type]
 
 
-class Force(Horizontal):
-    """One direction of the force on one flipper, in the last seconds."""
-
-    def __init__(self, flipper: str, direction: str) -> None:
-        super().__init__()
-        self._flipper, self._direction = flipper, direction
-
-    def compose(self) -> ComposeResult:
-        yield Label(f"{self._direction:8}")
-        yield Static(classes="curve")
-        yield Label(classes="value")
-
-    def show(self, history: History) -> None:
-        samples = list(history.forces.get(f"{self._flipper} {FORCES[self._direction]}", ()))
-        drives = [drive for drive in history.status["drives"] if drive["joint"].startswith(self._flipper)]
-        self.set_class(any(map(is_stale, drives)), "old")
-        curve = self.query_one(".curve", Static)
-        curve.update(Text(bars(samples[-curve.size.width :], LEAST_FORCE_N)[0], "cyan", justify="right"))
-        self.query_one(".value", Label).update(f"{number(samples[-1] if samples else None, 1):>7} N ")
-
-
 class WatchApp(App[int]):
     """Owns the feed, and what the operator is asked."""
 
@@ -125,10 +104,7 @@ class WatchApp(App[int]):
     ContentSwitcher { height: 1fr; }
     #help, #joints { height: 1fr; }
     #fault_list { height: auto; }
-    #forces, #walk, #strip, #machine, Label { height: auto; }
-    #forces Horizontal { height: 1; }
-    Force { width: 1fr; height: 1; }
-    Force .curve { width: 1fr; height: 1; }
+    #forces, #walk, #strip, #machine { height: auto; }
     .old { text-style: dim italic; }
     Rows { height: auto; scrollbar-size: 0 0; overflow: hidden; }
     Rows > .datatable--header { text-style: dim; background: ansi_default; }
@@ -182,13 +158,10 @@ class WatchApp(App[int]):
             yield Static(id="walk")
             columns = [((f"{flipper} (N/cm³)", 18), ("", 3), ("", 9)) for flipper in self._flippers]
             yield Rows([("", 4), *(column for each in columns for column in each)], "mud")
-            with Vertical(id="forces"):
-                for direction in FORCES:
-                    with Horizontal():
-                        yield from (Force(flipper, direction) for flipper in self._flippers)
+            yield Static(id="forces")
             yield Static(id="strip")
             yield Rows(STRIDE_COLUMNS, "strides")
-            yield Rows(DRIVE_COLUMNS, "drives")
+            yield Rows(list(DRIVE_COLUMNS.items()), "drives")
             yield Static(id="machine")
 
     def on_mount(self) -> None:
@@ -214,8 +187,7 @@ class WatchApp(App[int]):
         self.query_one("#alarm", Static).update(alarm_text(history, now_s))
         self.query_one("#walk", Static).update(walk_text(history))
         self.query_one("#mud", Rows).show(coefficient_rows(history, self._flippers))
-        for force in self.query(Force):
-            force.show(history)
+        self.query_one("#forces", Static).update(force_text(history, self.size.width))
         self.query_one("#strip", Static).update(
             strip_text(history, self.size.width, COEFFICIENTS if roomy else ("k_s",))
         )
@@ -243,7 +215,7 @@ class WatchApp(App[int]):
         question, messages = self.query_one("#question", Static), self.query_one("#messages")
         question.display, messages.display = bool(method), not method
         text = f"{QUESTIONS[method]} y: yes, any other key: no" if method in QUESTIONS else NOTE_QUESTION
-        question.update(Text(text, BADGES["arming"]))
+        question.update(Text(text, badge("arming")[1]))
 
     def action_confirm(self) -> None:
         if self._asked in QUESTIONS:
@@ -267,7 +239,7 @@ class WatchApp(App[int]):
 
     def action_scroll(self, screens: float) -> None:
         with self.feed.lock:
-            if self.feed.history.joints:
+            if self.feed.history.samples:
                 self._view.scroll(screens * self.size.width, self.feed.history)
         self.redraw()
 
@@ -294,6 +266,6 @@ class WatchApp(App[int]):
         is_alarm = message.startswith(TORQUE_UNKNOWN)
         if is_alarm:
             self.notify(message, severity="error", timeout=ALARM_S)
-        style = BADGES["fault"] if is_alarm else ""
+        style = badge("fault")[1] if is_alarm else ""
         line = Text.assemble((f"{time.strftime('%H:%M:%S')} ", "dim"), (message, style))
         self.query_one(RichLog).write(line, shrink=False)  # a log that a question hides is 0 columns wide

@@ -11,6 +11,7 @@ from command_line import exit_codes
 from command_line.experiments import studies
 from command_line.main import main
 from command_line.operation import operation
+from command_line.robot_text import unheard_text
 from command_line.screen import coefficient
 from control.records import JOINTS
 from experiments.reports.text_tables import number
@@ -80,7 +81,7 @@ def test_the_status_names_drives_that_were_not_heard_yet() -> None:
     drives = [heard | {"joint": joint} for joint in JOINTS]
     drives[1] = drives[1] | {"heartbeat_age_s": None}
     drives[3] = drives[3] | {"angle_age_s": None}
-    line = operation._boot_line(drives)
+    line = unheard_text({"drives": drives})
     assert "left_adduction, right_adduction" in line and "left_sweep" not in line
 
 

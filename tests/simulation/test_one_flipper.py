@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from command_line.live.page_server import robot_facts
+from command_line.watch.feed import updated
 from command_line.watch.history import History
 from command_line.watch.mud_cells import coefficient_rows
-from command_line.watch.row_feed import updated
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import Phase, Rig, StrideEstimate
@@ -103,7 +103,7 @@ def test_viewers_show_the_flippers_that_there_are(walked: Walked, tmp_path: Path
     row = {name: log.ticks[name][-1] for name in log.ticks.dtype.names or ()}
     history = History()
     history.add_status(updated(status, row), 0.0)
-    assert [len(row) for row in coefficient_rows(history, history.flippers)] == [4, 4, 4]
+    assert [len(row) for row in coefficient_rows(history, list(status["loads"]))] == [4, 4, 4]
     assert robot_facts(log.configuration_text)["flippers"] == RIGHT.flippers
     numbered = numbered_walk(Path("log"), log)
     assert [side.flipper for side in numbered.sides] == ["right"] and np.isfinite(numbered.depth_m[-1])

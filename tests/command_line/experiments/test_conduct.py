@@ -96,9 +96,7 @@ def test_the_end_of_the_input_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def options(folder: Path | None, **changes: object) -> argparse.Namespace:
-    return argparse.Namespace(
-        **({"out": folder, "restart": False, "json": False, "simulated": True, "name": "walk"} | changes)
-    )
+    return argparse.Namespace(**({"out": folder, "restart": False, "json": False, "simulated": True} | changes))
 
 
 def conduct(options: argparse.Namespace, run: Callable[[Session], Result]) -> int:
@@ -109,7 +107,7 @@ def conduct(options: argparse.Namespace, run: Callable[[Session], Result]) -> in
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studies, "load_study", lambda name: SimpleNamespace(__name__=STUDY, study=study))
-        return studies.run_study(options)
+        return studies.run_study("walk", options)
 
 
 def found(session: Session) -> Result:

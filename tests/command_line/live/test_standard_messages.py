@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores, get_typestore
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
-from command_line.live.ros_definitions import full_definition, schema_name
-from command_line.live.ros_messages import TOPICS, flipper_pose
-from command_line.live.standard_messages import MESSAGE_HZ, StandardMessages
+from command_line.live.standard_messages import MESSAGE_HZ, ROS, TOPICS, StandardMessages, flipper_pose
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import FLIPPERS, JOINTS
@@ -45,25 +44,19 @@ def served(log: Log) -> dict[str, list[tuple[int, bytes]]]:
 
 
 @pytest.fixture(scope="module")
-def by_rosbags(served: dict[str, list[tuple[int, bytes]]]) -> dict[str, list[tuple[int, Any]]]:
-    """Return the messages decoded by an independent library, which knows their definitions."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    names = {topic: schema_name(message) for topic, message in TOPICS.items()}
-    return {
-        topic: [(time_ns, store.deserialize_cdr(message, names[topic])) for time_ns, message in messages]
-        for topic, messages in served.items()
-    }
+def decoded(served: dict[str, list[tuple[int, bytes]]]) -> dict[str, list[tuple[int, Any]]]:
+    """Return the messages decoded by another library than that which encodes them, with the definitions served."""
+    found: dict[str, list[tuple[int, Any]]] = {}
+    for number, (topic, messages) in enumerate(served.items(), 1):
+        definition = ROS.generate_msgdef(TOPICS[topic], ros_version=2)[0].encode()
+        decode = DecoderFactory().decoder_for("cdr", Schema(number, definition, "ros2msg", TOPICS[topic]))
+        assert decode is not None
+        found[topic] = [(time_ns, decode(message)) for time_ns, message in messages]
+    return found
 
 
-@pytest.mark.parametrize("message", sorted(set(TOPICS.values())))
-def test_definitions_are_those_of_ros(message: str) -> None:
-    expected, _ = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(schema_name(message), ros_version=2)
-    parts = [sorted(text.strip().split("\n" + "=" * 80 + "\n")) for text in (full_definition(message), expected)]
-    assert parts[0] == parts[1]
-
-
-def test_joints_have_names_and_the_values_of_the_log(log: Log, by_rosbags: dict[str, list[tuple[int, Any]]]) -> None:
-    states = by_rosbags["/joint_states"]
+def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
+    states = decoded["/joint_states"]
     assert all(tuple(state.name) == JOINTS for _, state in states)
     chosen = log.ticks[:: round(380 / MESSAGE_HZ)]
     assert np.array_equal(np.stack([state.position for _, state in states]), chosen["angle_rad"])
@@ -72,23 +65,23 @@ def test_joints_have_names_and_the_values_of_the_log(log: Log, by_rosbags: dict[
     assert state.header.stamp.sec * 10**9 + state.header.stamp.nanosec == time_ns
 
 
-def test_messages_come_at_50_to_100_hz_in_the_order_of_time(by_rosbags: dict[str, list[tuple[int, Any]]]) -> None:
+def test_messages_come_at_50_to_100_hz_in_the_order_of_time(decoded: dict[str, list[tuple[int, Any]]]) -> None:
     for topic in TOPICS.keys() - {"/diagnostics"}:
-        times_ns = [time_ns for time_ns, _ in by_rosbags[topic]]
+        times_ns = [time_ns for time_ns, _ in decoded[topic]]
         steps_s = [(after - before) / 1e9 for before, after in pairwise(times_ns)]
         assert min(steps_s) >= 0.01 and max(steps_s) <= 0.02, topic
 
 
-def test_forces_and_frames_are_those_of_the_geometry(log: Log, by_rosbags: dict[str, list[tuple[int, Any]]]) -> None:
+def test_forces_and_frames_are_those_of_the_geometry(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
     chosen = log.ticks[:: round(380 / MESSAGE_HZ)]
     for number, flipper in enumerate(FLIPPERS):
-        forces = [message.wrench.force for _, message in by_rosbags[f"/{flipper}/force"]]
+        forces = [message.wrench.force for _, message in decoded[f"/{flipper}/force"]]
         assert np.array_equal([force.z for force in forces], chosen["force_z_n"][:, number], equal_nan=True)
-        poses = [message.pose.position for _, message in by_rosbags[f"/{flipper}/pose"]]
+        poses = [message.pose.position for _, message in decoded[f"/{flipper}/pose"]]
         depths_m = np.array([-(position.z + GEOMETRY.axis_height_m) for position in poses])
         differences_m = np.abs(depths_m - chosen["depth_m"][:, number])  # the loop takes it at the current's stamp
         assert np.median(differences_m) < 1e-4 and differences_m.max() < 0.005
-    _, frames = by_rosbags["/tf"][-1]
+    _, frames = decoded["/tf"][-1]
     parents = {each.child_frame_id: each.header.frame_id for each in frames.transforms}
     assert parents["base_link"] == "track" and parents["left_flipper"] == "left_edge"
     assert frames.transforms[0].transform.translation.x == chosen["body_x_m"][-1]
@@ -104,12 +97,12 @@ def test_the_frame_of_a_flipper_turns_with_its_arm(flipper: str) -> None:
         assert Rotation.from_quat(pose.quaternion).apply(arm_m) == pytest.approx(pose.position_m)
 
 
-def test_diagnostics_name_mode_joints_and_mud(log: Log, by_rosbags: dict[str, list[tuple[int, Any]]]) -> None:
-    time_ns, last = by_rosbags["/diagnostics"][-1]
+def test_diagnostics_name_mode_joints_and_mud(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
+    time_ns, last = decoded["/diagnostics"][-1]
     statuses = {status.name: {item.key: item.value for item in status.values} for status in last.status}
     assert statuses.keys() == {"robot", *JOINTS, "left mud", "right mud"}
     tick = log.ticks[np.argmin(np.abs(log.ticks["stamp_s"] - time_ns / 1e9))]
     assert statuses["robot"]["mode"] == Mode(tick["mode"]).name.lower()
     assert float(statuses["left_sweep"]["current_a"]) == pytest.approx(tick["current_a"][0], rel=1e-5)
     assert float(statuses["left mud"]["k_p"]) == pytest.approx(log.strides[-2]["k_p"], rel=1e-5)
-    assert len(by_rosbags["/diagnostics"]) < 40
+    assert len(decoded["/diagnostics"]) < 40

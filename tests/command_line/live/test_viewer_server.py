@@ -12,8 +12,7 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from websockets.sync.client import ClientConnection, connect
 
-from command_line.live.ros_definitions import schema_name
-from command_line.live.ros_messages import TOPICS
+from command_line.live.standard_messages import TOPICS
 from command_line.live.viewer_server import ViewerServer
 from control.records import JOINTS
 from firmware_host.log.rows import ROW_KINDS, TICK
@@ -72,9 +71,7 @@ def test_a_foreign_client_decodes_a_tick_by_the_definition_that_it_was_sent(serv
 def test_the_stream_has_standard_messages_with_named_joints(server: ViewerServer) -> None:
     with viewer_of(server) as (socket, channels):
         assert channels.keys() >= TOPICS.keys()
-        assert {topic: channels[topic]["schemaName"] for topic in TOPICS} == {
-            t: schema_name(m) for t, m in TOPICS.items()
-        }
+        assert {topic: channels[topic]["schemaName"] for topic in TOPICS} == TOPICS
         subscribe(socket, channels["/joint_states"]["id"])
         state = decoded(channels["/joint_states"], received(socket, server, lambda number: tick_row(4 * number)))
     assert dict(zip(state.name, state.position, strict=True)) == dict(zip(JOINTS, (0.1, 0.2, 0.3, 0.4), strict=True))

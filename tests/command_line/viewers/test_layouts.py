@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from command_line.live.ros_messages import TOPICS
+from command_line.live.standard_messages import TOPICS
 from command_line.viewers.open_log import LAYOUTS
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import TEXT

@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 
+from command_line.robot_text import BAD, OLD
 from command_line.watch.bars import bars
-from command_line.watch.history import History, JointSample
+from command_line.watch.history import History, Sample
 from command_line.watch.joint_plots import View
-from command_line.watch.machine_cells import BAD, OLD, alarm_text, drive_rows, faults_text, machine_text
 from command_line.watch.mud_cells import BOUND, coefficient_rows, trend
+from command_line.watch.robot_cells import alarm_text, drive_rows, faults_text, machine_text
 from control.faults import FaultKind
 from control.records import FLIPPERS, JOINTS
 from simulation.harness.lockstep import Lockstep
@@ -65,7 +66,7 @@ def test_a_silent_drive_has_unknown_torque(history: History) -> None:
 
 def test_torque_is_unknown_and_values_age_while_the_daemon_is_silent(history: History) -> None:
     assert alarm_text(history, NOW_S + 12.0).plain.startswith(" NO ANSWER ")
-    assert {(row[4].plain, row[5].plain) for row in drive_rows(history, silence_s=12.0)} == {("12.0 s", "unknown")}
+    assert {(row[5].plain, row[6].plain) for row in drive_rows(history, silence_s=12.0)} == {("12.0 s", "unknown")}
 
 
 def test_every_fault_is_listed_with_its_advice(walked: ServedRobot, history: History) -> None:
@@ -94,8 +95,9 @@ def test_bars_fill_the_height_only_beyond_the_floor(
 
 def test_plots_of_joints_scroll_back_and_follow_again(walked_history: History) -> None:
     history = copy.copy(walked_history)
-    signals = {"angle_rad": (0.5,) * 4, "current_a": (None,) * 4, "torque_command_nm": (0.0,) * 4}
-    history.joints = deque(JointSample(time_s=each / 10, **signals) for each in range(1000))
+    signals: dict[str, Any] = {"angle_rad": (0.5,) * 4, "current_a": (None,) * 4, "torque_command_nm": (0.0,) * 4}
+    signals |= dict.fromkeys(("force_x_n", "force_z_n"), (0.0,) * 2)
+    history.samples = deque(Sample(time_s=each / 10, body_x_m=None, **signals) for each in range(1000))
     view = View(period_s=0.1)
     assert view.text(history, 80, 20).plain.count("▁") == 4 * 56
     view.scroll(-100, history)

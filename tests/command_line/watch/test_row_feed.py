@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from command_line.watch.feed import STATUS_S, Feed
-from command_line.watch.row_feed import updated
+from command_line.watch.feed import STATUS_S, Feed, updated
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.row_stream import RowStream, stream_path
@@ -69,7 +68,7 @@ def test_with_rows_the_daemon_is_asked_less_often_and_the_screen_stays_current(
         assert feed.poll(0.0)  # connects to the status socket and the row stream
         while not feed.rows.live:
             stream.publish([])
-            feed.rows.newest(0.0)
+            feed._newest_tick(0.0)
             time.sleep(0.01)
         while len(feed.history.strides) < feed.history.status["strides_closed"]:
             feed.poll(0.0)

@@ -56,7 +56,7 @@ def drive(
     return app
 
 
-@pytest.mark.parametrize(("width", "height"), [(80, 24), (120, 40)])
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (120, 46)])
 def test_it_shows_every_part_of_a_robot_that_walks(
     walked: ServedRobot, short_folder: Path, width: int, height: int
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from command_line.drive_state import is_stale, torque_state
+from command_line.robot_text import is_stale, torque_state
 
 
 @pytest.mark.parametrize(
