@@ -21,7 +21,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
@@ -31,6 +30,7 @@ from firmware_host.sockets.socket_methods import Level
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from verification.example_robot import load_example
+from verification.faults.failing_robot import RowList
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 DIFFERENCES_SHOWN = 12  # of one file
@@ -71,18 +71,6 @@ SCHEDULE: tuple[tuple[tuple[tuple[str, dict[str, Any]], ...], float], ...] = (
     ((("clear", {}), ("disarm", {})), 1.0),
     ((("reset_timing", {}),), 0.5),
 )
-
-
-class RowList(NullRecorder):
-    """A recorder that stores the rows."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.rows: list[tuple[int, bytes]] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        self.rows.append((kind_index, payload))
-        return True
 
 
 def record_lockstep(folder: Path) -> None:

@@ -26,8 +26,7 @@ from simulation.mud.track import Track
 from tests.copied_robots import copy_of
 from tests.dst.scenario import Surroundings
 from tests.folders import EXAMPLE_CONFIGURATION
-from verification.behaviour import RowList
-from verification.faults.failing_robot import FailingRobot
+from verification.faults.failing_robot import FailingRobot, RowList
 
 TRACK_M, STONE_LENGTH_M, STONE_TOP_M = 5.0, 0.2, 0.02
 LONGEST_S = 6.0  # from one start to the next

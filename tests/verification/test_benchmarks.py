@@ -119,9 +119,9 @@ def test_soak() -> None:
 
 
 def test_daemon_kills() -> None:
-    """Each victim is killed once. A busy machine only lengthens waits, and no time is asserted."""
-    report = report_of("daemon_kills", "--kills", "4")
-    assert [made["victim"] for made in report["rounds"]] == list(daemon_kills.VICTIMS)
+    """The last victim, the session, is both others at once. A busy machine only lengthens waits, and no time is asserted."""
+    report = report_of("daemon_kills", "--kills", "3")
+    assert [made["victim"] for made in report["rounds"]] == list(daemon_kills.VICTIMS[:3])
     for made in report["rounds"]:
         assert (made["phase"], made["idle"], made["moved_again_s"]) == ("insertion", True, 0.0)
         assert (made["complaints"], made["files_not_whole"], made["ticks_missing"]) == ([], 0, 0)

@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from experiments.study.provenance import PACKAGES, provenance, source_digest
 from verification.claims.pages import pages_of, rewrite_pages
@@ -29,7 +29,7 @@ from verification.claims.results import (
     load_claims,
     load_result,
     load_results,
-    picture_digest,
+    picture_digests,
     result_path,
     tolerance_of,
     write_result,
@@ -38,12 +38,6 @@ from verification.claims.results import (
 LOGS = "LOGS"
 RECORDED = ("version", "sources", "commit", "python", "machine", "date")
 NOT_RUN, DRIFTED, INTERRUPTED = 2, 1, 130
-
-
-class Measured(NamedTuple):
-    output: Any
-    seconds: float
-    folder: Path
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
@@ -97,16 +91,17 @@ def _check(claims: Sequence[Claim], options: argparse.Namespace, root: Path) -> 
 def _is_true(claim: Claim, options: argparse.Namespace, root: Path) -> bool:
     """Measure a claim, print what drifted, and rewrite its result where asked for. Raises ValueError."""
     path = result_path(claim.name, root)
-    old = load_result(path).figures if path.exists() else {}
-    measured = measure(claim, options.logs, root)
-    new = claimed_figures(claim, measured.output)
+    old = load_result(path)["figures"] if path.exists() else {}
+    folder = root / "build" / "claims" / f"{claim.name}-{_key(claim)}"
+    measured = measure(claim, options.logs, folder, root)
+    new = claimed_figures(claim, measured["output"])
     drifts = drifted(claim, old, new)
     for each in drifts if old else []:
         shown = ", ".join(pages_of(claim.name, each, root)) or "on no page"
         was, now = old.get(each, "nothing"), new.get(each, "nothing")
         print(f"  drifted: {each} was {was}, is {now} (tolerance: {tolerance_of(claim, each)}; {shown})")
     if options.rewrite:
-        _write(claim, measured, new, root)
+        _write(claim, measured, new, folder, root)
     elif not old:
         print("  no result yet: --rewrite writes it")
     return options.rewrite or not drifts
@@ -122,14 +117,13 @@ def _time_left(claims: Sequence[Claim], number: int, began: float, root: Path) -
 
 def _seconds(path: Path) -> float:
     try:
-        return load_result(path).seconds
+        return load_result(path)["seconds"] or 0.0
     except InvalidResultError:  # or none yet
         return 0.0
 
 
-def measure(claim: Claim, logs: Path | None, root: Path) -> Measured:
-    """Return what the command prints now, or has printed for the same sources. Raises ValueError."""
-    folder = root / "build" / "claims" / f"{claim.name}-{_key(claim)}"
+def measure(claim: Claim, logs: Path | None, folder: Path, root: Path) -> Any:
+    """Return the `output` of the command and its `seconds`, now or before for the same sources. Raises ValueError."""
     kept = folder / "measured.json"
     if not kept.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -139,7 +133,7 @@ def measure(claim: Claim, logs: Path | None, root: Path) -> Measured:
         claimed_figures(claim, output)  # what lacks them, such as the JSON of an error, is not kept
         kept.with_suffix(".part").write_text(json.dumps({"seconds": round(seconds, 1), "output": output}))
         kept.with_suffix(".part").rename(kept)
-    return Measured(folder=folder, **json.loads(kept.read_text()))
+    return json.loads(kept.read_text())
 
 
 def _key(claim: Claim) -> str:
@@ -172,16 +166,19 @@ def drifted(claim: Claim, old: Mapping[str, Figure], new: Mapping[str, Figure]) 
     ]
 
 
-def _write(claim: Claim, measured: Measured, figures: dict[str, Figure], root: Path) -> None:
-    record = measured.output.get("provenance") or provenance("verification.claims.__main__")
+def _write(claim: Claim, measured: Any, figures: dict[str, Figure], folder: Path, root: Path) -> None:
+    record = measured["output"].get("provenance") or provenance("verification.claims.__main__")
     for picture, written in claim.pictures.items():
-        shutil.copyfile(next(measured.folder.glob(written)), root / "docs" / picture)
+        shutil.copyfile(next(folder.glob(written)), root / "docs" / picture)
     write_result(
         result_path(claim.name, root),
         {"command": claim.command}
         | {key: record[key] for key in RECORDED}
-        | {"seconds": measured.seconds, "tolerances": dict(claim.figures)}
-        | {"pictures": {each: picture_digest(root / "docs" / each) for each in claim.pictures}, "figures": figures},
+        | {"seconds": measured["seconds"], "tolerances": dict(claim.figures)}
+        | {
+            "pictures": picture_digests(claim, root),
+            "figures": figures,
+        },
     )
 
 

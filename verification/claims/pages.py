@@ -51,7 +51,7 @@ def _with_rows(template: str) -> str:
 
 def _value(field: re.Match[str], results: Mapping[str, Result]) -> str:
     result = results.get(field["name"])
-    found = [figure for path, figure in result.figures.items() if matches(path, field["pattern"])] if result else []
+    found = [figure for path, figure in result["figures"].items() if matches(path, field["pattern"])] if result else []
     if not found:
         raise ValueError(f"no result has the figure {field['name']}/{field['pattern']}")
     numbers = sorted(each for each in found if isinstance(each, int | float))

@@ -37,16 +37,7 @@ class Claim(NamedTuple):
     pictures: Mapping[str, str] = {}  # pattern of the written file, by the picture of the documentation
 
 
-class Result(NamedTuple):
-    record: dict[str, Any]  # the whole file
-
-    @property
-    def figures(self) -> dict[str, Figure]:
-        return self.record["figures"]  # type: ignore[no-any-return]
-
-    @property
-    def seconds(self) -> float:
-        return self.record.get("seconds") or 0.0
+Result = dict[str, Any]  # the whole file: the command, what identifies the run, and the figures
 
 
 def load_claims(root: Path = ROOT) -> dict[str, Claim]:
@@ -69,7 +60,8 @@ def load_result(path: Path) -> Result:
         raise InvalidResultError(f"{path}: cannot be read ({error!r}); {again}") from error
     if digest != written:
         raise InvalidResultError(f"{path}: was edited by hand; {again}")
-    return Result(record)
+    result: Result = record
+    return result
 
 
 def load_results(root: Path = ROOT) -> dict[str, Result]:
@@ -87,8 +79,8 @@ def digest_of(record: Mapping[str, Any]) -> str:
     return sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def picture_digest(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest()[:16]
+def picture_digests(claim: Claim, root: Path = ROOT) -> dict[str, str]:
+    return {each: sha256((root / "docs" / each).read_bytes()).hexdigest()[:16] for each in claim.pictures}
 
 
 def claimed_figures(claim: Claim, output: Any) -> dict[str, Figure]:

@@ -15,6 +15,7 @@ from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.rate import PERIOD_S
 from drivers.drive_types import DEFAULT
 from drivers.fault_injection.failure_table import REPORTED_S, FailureMode
+from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from verification.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
 from verification.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from verification.faults.failing_robot import FaultBench
@@ -85,7 +86,7 @@ class Measurement:
         self._cell = cell
         self._steps = 0
         self._first_tick = bench.loop_ticks
-        self._first_text = len(bench.rows.texts)
+        self._first_row = len(bench.rows.rows)
         self._strictness = max(0, self._kind.reaction - Reaction.WARN) if self._kind else 0
         self._only_reported = self._kind is not None and (  # the mode was as strict before, or none is demanded
             self._kind.reaction < Reaction.HOLD or STRICTNESS[bench.loop.mode] >= self._strictness
@@ -95,7 +96,6 @@ class Measurement:
         self._damping_steps = 0
         self._stopping_since: int | None = None
         self._disarmed_steps = 0
-        self._missing_rows = bench.loop_ticks - bench.rows.ticks
         self._travel_rad = 0.0
         self._restarted = mode.restarted
         self._energy = MotorEnergy(bench, mode)
@@ -225,10 +225,11 @@ class Measurement:
     def _end(self) -> None:
         cell, bench = self._cell, self._bench
         cell.mode = bench.loop.mode.name.lower()
-        texts = bench.rows.texts[self._first_text :]
+        rows = bench.rows.rows[self._first_row :]
+        texts = [EVENT.decode(row)["text"] for kind, row in rows if kind == EVENT_KIND]
         cell.reported = list(dict.fromkeys(text.split()[1] for text in texts if text.startswith("fault ")))
         cell.exception = bench.bug
-        cell.rows_lost = bench.loop_ticks - bench.rows.ticks - self._missing_rows
+        cell.rows_lost = self._ticks - sum(kind == TICK_KIND for kind, _ in rows)
         if self._steps - self._last_torque_steps > DELAY_TICKS:
             cell.zero_torque_ticks = self._last_torque_steps
         self._energy.record(cell)

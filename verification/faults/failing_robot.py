@@ -20,7 +20,6 @@ from drivers.fault_injection.failures import Failures, end_text
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import end_safely
 from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
-from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.body.plant import Arm
 from simulation.devices.drive import SimulatedDriveParameters
@@ -131,22 +130,18 @@ class FailingRobot(Lockstep):
         return live
 
 
-class CountingRecorder(NullRecorder):
-    """A Recording. Owns the count of the ticks' rows, the texts of the events, and the report of its writer."""
+class RowList(NullRecorder):
+    """A recorder that stores the rows. Its writer reports what `reported` says."""
 
     def __init__(self) -> None:
-        self.ticks = 0
-        self.texts: list[str] = []
-        self.reported = HEALTHY  # by the log's writer
+        self.rows: list[tuple[int, bytes]] = []
+        self.reported = HEALTHY
 
     def report(self) -> LogReport:
         return self.reported
 
     def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == TICK_KIND:
-            self.ticks += 1
-        elif kind_index == EVENT_KIND:
-            self.texts.append(EVENT.decode(payload)["text"])
+        self.rows.append((kind_index, payload))
         return True
 
 
@@ -154,7 +149,7 @@ class FaultBench(FailingRobot):
     """A failing robot that goes on while its loop is stalled or dead."""
 
     def __init__(self, configuration: Configuration, track: Track, seed: int) -> None:
-        self.rows = CountingRecorder()
+        self.rows = RowList()
         super().__init__(configuration, track, seed, recorder=self.rows)
         self.loop_ticks = 0
         self._stalled_steps = 0  # coming periods in which the loop does nothing

@@ -18,9 +18,9 @@ from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
-from verification.behaviour import RowList
 from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
+from verification.faults.failing_robot import RowList
 
 BAR_MEMORY, BAR_TIME = 1.5, 1.3
 KIB_PER_MIB = 1024

@@ -109,7 +109,7 @@ class SoakedLoop:
         self.asked: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.mode_ticks: Counter[str] = Counter()
-        self.ticks = self.moved_by_hand = 0
+        self.ticks = 0
 
     def _now_s(self) -> float:
         return self.robot.now_s
@@ -148,7 +148,6 @@ class SoakedLoop:
         if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
             for arm in self.robot.robot.plant.arms:
                 arm.reset()
-            self.moved_by_hand += 1
         if self.ticks % CALL_TICKS == 0:
             self._visit(self._next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
         if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
@@ -202,7 +201,6 @@ class SoakedLoop:
             "simulated_s": round(self.robot.now_s, 1),
             "strides": loop.learning.strides_closed,
             "walked_m": round(self.robot.robot.plant.body_m, 2),
-            "moved_by_hand": self.moved_by_hand,
             "asked": dict(self.asked),
             "faults": dict(self.faults),
             "modes_s": {mode: round(ticks / RATE_HZ, 1) for mode, ticks in self.mode_ticks.items()},

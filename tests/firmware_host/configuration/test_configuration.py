@@ -6,8 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from control.gait.gait import PROTOCOLS, SINGLE_FLIPPER
 from control.records import JOINTS
@@ -314,28 +312,6 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"a = 1\n# gr\xfc\xdf\n")
     with pytest.raises(ConfigurationError, match=r"x\.toml: not UTF-8 text \(at line 2\); save the file as UTF-8"):
         load_configuration(path)
-
-
-TOML_VALUES = st.one_of(
-    st.integers(-(2**40), 2**40).map(str),
-    st.floats(allow_nan=True).map(lambda x: repr(x)),
-    st.booleans().map(lambda x: str(x).lower()),
-    st.sampled_from(['""', '"x"', "[]", "{}", "[1, 2]", "{ a = 1 }"]),
-)
-KEYS = st.sampled_from(
-    ["geometry.drop_m", "geometry.plate_corners_m", "gait.pause_s", "gait.protocol", "limits.torque_nm",
-     "drive.left_sweep.bus", "bus.a.options",
-     "adaptation.max_depth_m", "robot.name", "loop", "drive", "bus", "geometry", "gait", "nonsense.key", "text"]
-)  # fmt: skip
-
-
-@given(KEYS, TOML_VALUES)
-def test_any_value_anywhere_is_accepted_or_refused_by_name(key: str, value: str) -> None:
-    """No other exception than ConfigurationError occurs."""
-    try:
-        parse_configuration(f"{key} = {value}\n{minimal_text()}")
-    except ConfigurationError as problem:
-        assert problem.problems and all(problem.problems)
 
 
 @pytest.mark.parametrize("option", [[], ["--check-config"]])

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -158,26 +156,6 @@ def test_a_file_that_is_no_world_is_reported_by_its_name(tmp_path: Path, content
         path.write_bytes(contents)
     with pytest.raises(ConfigurationError, match=str(path)):
         load_world(path)
-
-
-VALUES = st.one_of(
-    st.integers(-(2**40), 2**40).map(str),
-    st.floats(allow_nan=True).map(repr),
-    st.sampled_from(["true", '""', "[]", "{}", "[1, 2]", "[{}]", "[{ start_m = 1 }]", "{ a = 1 }"]),
-)
-KEYS = st.sampled_from(
-    ["segment", "stone", "ridges", "robot", "drives", "disturbances", "random_strength", "ridges.amplitude_m", "x",
-     "robot.body_mass_kg", "drives.encoder_counts", "disturbances.relaxation", "random_strength.seed", "robot.x.y"]
-)  # fmt: skip
-
-
-@given(KEYS, VALUES)
-def test_any_value_anywhere_is_taken_or_refused_by_name(key: str, value: str) -> None:
-    """No other exception than ConfigurationError occurs."""
-    try:
-        parse_world(f"{key} = {value}\n" + ("" if key == "segment" else SHORTEST))
-    except ConfigurationError as problem:
-        assert problem.problems and all(problem.problems)
 
 
 def test_robot_and_drives_accept_all_fields_of_their_records() -> None:
