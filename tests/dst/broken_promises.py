@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 from control import controller, joint_pd
@@ -23,6 +23,7 @@ from firmware_host.log.segments import LogSegments
 from firmware_host.loop import Loop
 from firmware_host.loop_events import LoopEvents
 from simulation.devices.odrive.device import SimulatedOdrive
+from tests.dst.scenario import Call, Drift, Event, Failure, Suspend
 
 Break = Callable[[], AbstractContextManager[Any]]
 
@@ -150,20 +151,33 @@ def no_watchdogs() -> AbstractContextManager[Any]:
     return mock.patch.object(SimulatedOdrive, "_trip_if_due", lambda *arguments: None)
 
 
-BREAKS: dict[str, Break] = {  # by the promise that must notice
-    "LimitedMotors": no_limits,
-    "LittleEnergy": damping_pushes,
-    "DisarmAtOnce": disarm_ignored,
-    "StopInTime": stop_ignored,
-    "ArmedByRequest": arms_by_itself,
-    "NoTorqueWithoutMode": silent_without_torque,
-    "LeaseHeld": leases_ignored,
-    "SilentLoop": no_watchdogs,
-    "TrueTorque": joints_unwatched,
-    "WithinStops": joints_unwatched,
-    "BoundedEnergy": unwatched_and_unlimited,
-    "NoFalseAlarm": false_encoder_fault,
-    "NoBug": tick_raises,
-    "BackToIdle": fault_stays,
-    "WholeLog": rows_vanish,
+class Broken(NamedTuple):
+    """A robot that breaks a promise, and the start, the events and the duration that show it."""
+
+    patch: Break
+    start: str
+    events: tuple[Event, ...] = ()
+    for_s: float = 0.3
+
+
+BREAKS = {  # by the promise that must notice
+    "LimitedMotors": Broken(no_limits, "stance", (Failure(0.01, "left_sweep.arm", "blocked", 0.2),)),
+    "LittleEnergy": Broken(damping_pushes, "stance", (Failure(0.05, "bus.left", "stuck", 0.02),), 1.0),
+    "DisarmAtOnce": Broken(disarm_ignored, "stance", (Call(0.05, "guest", "disarm"),)),
+    "StopInTime": Broken(stop_ignored, "hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop"))),
+    "ArmedByRequest": Broken(arms_by_itself, "stance", (Call(0.05, "guest", "disarm"),), 0.8),
+    "NoTorqueWithoutMode": Broken(silent_without_torque, "stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),)),
+    "LeaseHeld": Broken(
+        leases_ignored, "hold", (Call(0.0, "pilot", "lease", {"for_s": 1.0}), Call(0.1, "second", "walk"))
+    ),
+    "SilentLoop": Broken(no_watchdogs, "stance", (Suspend(0.05, 0.4, "drives.send"),), 0.6),
+    "TrueTorque": Broken(
+        joints_unwatched, "path", (Drift(0.0, "left_sweep", {"torque_constant_error": 4.0}, 1.5),), 1.5
+    ),
+    "WithinStops": Broken(joints_unwatched, "stance", (Failure(0.0, "left_sweep.motor", "inverted", 1.2),), 1.2),
+    "BoundedEnergy": Broken(unwatched_and_unlimited, "stance", (Failure(0.0, "left_sweep.motor", "inverted", 0.6),)),
+    "NoFalseAlarm": Broken(false_encoder_fault, "stance"),
+    "NoBug": Broken(tick_raises, "hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear"))),
+    "BackToIdle": Broken(fault_stays, "hold", (Failure(0.05, "left_sweep", "off", 0.05),)),
+    "WholeLog": Broken(rows_vanish, "release"),
 }

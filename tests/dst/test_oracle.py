@@ -8,49 +8,32 @@ from tests.dst.broken_promises import BREAKS
 from tests.dst.drawing import draw_scenario
 from tests.dst.promises import PROMISES
 from tests.dst.run import run_scenario
-from tests.dst.scenario import Call, Drift, Event, Failure, Scenario, Surroundings, Suspend
+from tests.dst.scenario import Call, Failure, Scenario, Surroundings
 from tests.dst.shrinking import shrink
 from tests.dst.starts import sound_walk
 
 QUICK = Surroundings(configuration=(("motion.path_speed_rad_s", 3.0), ("motion.fade_in_s", 0.1)))
-SHORT_S = 0.3
-SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events and duration that show each break
-    "LimitedMotors": ("stance", (Failure(0.01, "left_sweep.arm", "blocked", 0.2),), SHORT_S),
-    "LittleEnergy": ("stance", (Failure(0.05, "bus.left", "stuck", 0.02),), 1.0),
-    "DisarmAtOnce": ("stance", (Call(0.05, "guest", "disarm"),), SHORT_S),
-    "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
-    "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
-    "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
-    "LeaseHeld": ("hold", (Call(0.0, "pilot", "lease", {"for_s": 1.0}), Call(0.1, "second", "walk")), SHORT_S),
-    "SilentLoop": ("stance", (Suspend(0.05, 0.4, "drives.send"),), 0.6),
-    "TrueTorque": ("path", (Drift(0.0, "left_sweep", {"torque_constant_error": 4.0}, 1.5),), 1.5),
-    "WithinStops": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 1.2),), 1.2),
-    "BoundedEnergy": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 0.6),), SHORT_S),
-    "NoFalseAlarm": ("stance", (), SHORT_S),
-    "NoBug": ("hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear")), SHORT_S),
-    "BackToIdle": ("hold", (Failure(0.05, "left_sweep", "off", 0.05),), SHORT_S),
-    "WholeLog": ("release", (), SHORT_S),
-}
 
 
 @pytest.fixture(scope="module", autouse=True)
 def sound_robots() -> None:
     """Pass the starts of the schedules while the robot is whole."""
-    for start, _, _ in SCHEDULES.values():
-        sound_walk(QUICK).robot_at(start)
+    for broken in BREAKS.values():
+        sound_walk(QUICK).robot_at(broken.start)
 
 
-@pytest.mark.parametrize("promise", SCHEDULES)
+@pytest.mark.parametrize("promise", BREAKS)
 def test_a_broken_promise_is_noticed(promise: str) -> None:
-    scenario = Scenario(1, QUICK, *SCHEDULES[promise])
+    patch, start, events, for_s = BREAKS[promise]
+    scenario = Scenario(1, QUICK, start, events, for_s)
     alone = [each for each in PROMISES if each.__name__ == promise]  # no other promise notices first
     assert run_scenario(scenario, alone).problem == ""
-    with BREAKS[promise]():
+    with patch():
         assert run_scenario(scenario, alone).promise == promise
 
 
 def test_every_promise_has_a_robot_that_breaks_it() -> None:
-    assert {each.__name__ for each in PROMISES} <= set(BREAKS) == set(SCHEDULES)
+    assert {each.__name__ for each in PROMISES} <= set(BREAKS)
 
 
 def test_a_seed_gives_the_same_run_every_time() -> None:

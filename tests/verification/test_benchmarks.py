@@ -119,7 +119,7 @@ def test_soak() -> None:
 
 
 def test_daemon_kills() -> None:
-    """The last victim, the session, is both others at once. A busy machine only lengthens waits, and no time is asserted."""
+    """The last victim is two of these at once. A busy machine only lengthens waits, and no time is asserted."""
     report = report_of("daemon_kills", "--kills", "3")
     assert [made["victim"] for made in report["rounds"]] == list(daemon_kills.VICTIMS[:3])
     for made in report["rounds"]:
