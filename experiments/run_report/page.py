@@ -2,12 +2,15 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from math import isfinite
 from typing import Any
 
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
+from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome, choose_strides, with_strides
 from experiments.pictures.stride_strip import draw_strip
@@ -25,6 +28,7 @@ from experiments.run_report.results import (
     differences,
     end_sentences,
     flipper_difference,
+    headline_of,
     headline_sentences,
     is_shown,
     reaction_of,
@@ -32,11 +36,15 @@ from experiments.run_report.results import (
 )
 from experiments.run_report.run import MudsFrom, Run
 from experiments.study.result import Figure, Result, Table
-from firmware_host.trial import read_report
+from experiments.study.session import Ending
+from firmware_host.operator.reports import map_report, stride_report
+from firmware_host.trial import OperatorReport, read_report
 from logs.fault_history import BEGUN, OVER
 from logs.files.log_summary import log_summary, operator_reports
+from logs.lab.summary import finding_reports
 
 CM = 0.01  # in metres
+FIT = ["r_squared", "r_squared_about_mean", "rms_residual_nm"]
 UNITS = dict.fromkeys(("first at", "last at", "at", "from"), "s") | dict.fromkeys(("depth", "step"), "cm")
 UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {
     "distance": "m",
@@ -73,27 +81,36 @@ DEPTHS = "Coefficients from other depths differ also in the same mud."
 COMPARED = "Speed and coefficients of each run by mud. Bars are two standard errors; an arrow marks a lower bound."
 
 
+def report_of(runs: Sequence[Run]) -> Result:
+    """Describe one run, or compare several. The result ends unhealthy where a log does."""
+    headlines = [headline_of(run) for run in runs]
+    result = run_result(runs[0], headlines[0]) if len(runs) == 1 else comparison_result(runs, headlines)
+    whole = all(headline["complete"] for headline in headlines)
+    tables = [table for table in result.tables if len(table.rows)]
+    return replace(result, tables=tables, ending=Ending.DONE if whole else Ending.UNHEALTHY)
+
+
 def run_result(run: Run, headline: Entry) -> Result:
     """Describe one run."""
     begin_s, texts = run.replay.begin_s, {"Result": _result_text(run, headline)}
     tables = [_table("Result", [{"mud": each["mud"]} | _mud_cells(each) for each in headline["muds"]])]
     figures: list[Figure] = []
     if run.log is None:
-        texts |= {"Findings": "What the reader noticed in the file." if run.replay.findings else "None."}
+        texts["Findings"] = "What the reader noticed in the file." if run.replay.findings else "None."
         tables.append(_table("Findings", [{"kind": each.kind, "finding": str(each)} for each in run.replay.findings]))
     else:
-        texts |= {"Faults": f"{SINCE} Faults of one cause are one row." if run.causes else "None."}
+        texts["Faults"] = f"{SINCE} Faults of one cause are one row." if run.causes else "None."
         tables.append(_table("Faults", _cause_rows(run, begin_s)))
     for index, walk in enumerate(run.walks, 1):
         texts[f"Walk {index}"] = _walk_text(walk)
         figures += _walk_figures(run, walk, index)
     if headline["muds"]:
-        rows = quality_rows(run)
-        has_fits = bool(run.estimates["samples"].notna().any())
-        without = "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
-        texts["Fits"] = R_SQUARED if has_fits else without
-        tables += [_table("Fits", rows)] * has_fits
-        figures += [Figure("fits", _fits_caption(run, headline), partial(draw_fits, run), "Fits")] * has_fits
+        if run.estimates["samples"].notna().any():
+            texts["Fits"] = R_SQUARED
+            tables.append(_table("Fits", quality_rows(run)))
+            figures.append(Figure("fits", _fits_caption(run, headline), partial(draw_fits, run), "Fits"))
+        else:
+            texts["Fits"] = "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
         if len(run.replay.flippers) > 1:
             texts["Left and right"] = "The difference has the errors of both, since each flipper has motors of its own."
             tables.append(_table("Left and right", _flipper_rows(headline)))
@@ -102,17 +119,37 @@ def run_result(run: Run, headline: Entry) -> Result:
         tables.append(_table("Strides", stride_rows(run)))
         tables += [_table("Strides", estimate_rows(run, name), f"{name} by stride") for name in COEFFICIENTS]
     if run.log:
+        if reports := operator_reports(run.log.events):
+            texts["Notes"] = f"What operators wrote into the log. {SINCE}"
+            tables.append(_table("Notes", [_report_row(stamp_s - begin_s, report) for stamp_s, report in reports]))
         groups = group_events(run.log.events, begin_s)
         text = f"{SINCE} Events that differ only in numbers are one row, with the range of the numbers."
-        if reports := _report_rows(run, begin_s):
-            texts["Notes"] = f"What operators wrote into the log. {SINCE}"
-            tables.append(_table("Notes", reports))
         texts |= {"Events": text if groups else "None.", "Log": ""}
         summary = [{"field": name, "value": value} for name, value in log_summary(run.log).items()]
         tables += [_table("Events", groups), _table("Log", summary)]
-    return Result(
-        [table for table in tables if len(table.rows)], figures, title=f"Log {run.paths[0].name}", texts=texts
-    )
+    return Result(tables, figures, _run_summary(run, headline), f"Log {run.paths[0].name}", texts)
+
+
+def _run_summary(run: Run, headline: Entry) -> Entry:
+    return {
+        "log": [path.name for path in run.paths],
+        "clock": "times of strides and events are by the log's own clock; the log begins at begin_s of it",
+        "begin_s": run.replay.begin_s,
+        "headline": headline,
+        "muds_from": run.muds_from,
+        "summary": log_summary(run.log) if run.log else {},
+        "strides": [stride_report(stride) for stride in run.replay.strides],
+        "fits": [{name: _fit_summary(getattr(fits, name)()) for name in COEFFICIENTS} for fits in run.replay.fits],
+        "map": map_report(run.replay.map),
+        "faults": [cause._asdict() for cause in run.causes],
+        "events": run.log.events if run.log else [],
+        "findings": finding_reports(run.paths[0], run.replay.findings),
+    }
+
+
+def _fit_summary(samples: FitSamples | None) -> Entry | None:
+    """Return the quality of a fit; None for a coefficient without one."""
+    return samples and {name: getattr(samples, name) for name in FIT} | {"samples": len(samples.torques_nm)}
 
 
 def _table(section: str, rows: Sequence[Mapping[str, Any]], title: str = "") -> Table:
@@ -206,18 +243,9 @@ def _cause_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
     ]
 
 
-def _report_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
-    reports = operator_reports(run.log.events) if run.log else []
-    return [
-        {
-            "at": stamp_s - begin_s,
-            "universal time": f"{report.time:%Y-%m-%d %H:%M:%S.%f}"[:-3],
-            "kind": report.kind,
-            "text": report.text,
-            "by": report.by,
-        }
-        for stamp_s, report in reports
-    ]
+def _report_row(at_s: float, report: OperatorReport) -> dict[str, Any]:
+    time = f"{report.time:%Y-%m-%d %H:%M:%S.%f}"[:-3]
+    return {"at": at_s, "universal time": time, "kind": report.kind, "text": report.text, "by": report.by}
 
 
 def group_events(events: Iterable[Mapping[str, Any]], begin_s: float) -> list[dict[str, Any]]:
@@ -252,8 +280,7 @@ def quality_rows(run: Run) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"mud": mud, "coefficient": name}
         for flipper in run.replay.flippers:
             found = estimates[estimates["flipper"] == flipper]["samples"].dropna()
-            names = ("r_squared", "r_squared_about_mean", "rms_residual_nm")
-            medians = DataFrame([[getattr(each, name) for name in names] for each in found], columns=names).median()
+            medians = DataFrame([[getattr(each, name) for name in FIT] for each in found], columns=FIT).median()
             r_squared, about_mean, residual_nm = medians.tolist()
             row |= {f"{flipper}: fits": len(found) or "-", f"{flipper}: R²": r_squared}
             row |= {f"{flipper}: R² about mean": about_mean, f"{flipper}: residual (N·cm)": N_CM * residual_nm}
@@ -280,23 +307,17 @@ def stride_rows(run: Run) -> list[dict[str, Any]]:
 def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
     """List one coefficient of every stride with R² and residual of its fit, the flippers side by side."""
     rows: dict[tuple[int, int], dict[str, Any]] = {}
-    for each in run.estimates[run.estimates["coefficient"] == name].to_dict("records"):
-        flipper, samples, estimate = each["flipper"], each["samples"], each["estimate"]
-        text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-        text = f"≥ {text}" if estimate["at_least"] else text
-        row = rows.setdefault((each["walk"], each["index"]), {"walk": each["walk"], "stride": each["index"]})
-        row[f"{flipper} (N/cm³)"] = text if estimate["valid"] or text == "-" else f"({text})"
-        row[f"{flipper}: at"] = stroke_text(estimate)
-        row[f"{flipper}: R²"] = f"{samples.r_squared:.3f}" if samples else "-"
-        row[f"{flipper}: residual (N·cm)"] = f"{N_CM * samples.rms_residual_nm:.2f}" if samples else "-"
+    for each in run.estimates[run.estimates["coefficient"] == name].itertuples():
+        text = value_text(each.value, each.std_error, per=N_CM3)
+        text = f"≥ {text}" if each.at_least else text
+        row = rows.setdefault((each.walk, each.index), {"walk": each.walk, "stride": each.index})
+        row[f"{each.flipper} (N/cm³)"] = text if each.valid or text == "-" else f"({text})"
+        speed = f", {each.speed_m_s:.2g} m/s" * isfinite(each.speed_m_s)
+        row[f"{each.flipper}: at"] = f"{each.depth_m / CM:.1f} cm{speed}" if isfinite(each.depth_m) else "-"
+        row[f"{each.flipper}: R²"] = f"{each.samples.r_squared:.3f}" if each.samples else "-"
+        residual = f"{N_CM * each.samples.rms_residual_nm:.2f}" if each.samples else "-"
+        row[f"{each.flipper}: residual (N·cm)"] = residual
     return list(rows.values())
-
-
-def stroke_text(estimate: Mapping[str, Any]) -> str:
-    """Return the depth and the speed of the stroke that an estimate is from; a dash where the log has none."""
-    depth_m, speed_m_s = estimate["depth_m"], estimate["speed_m_s"]
-    speed = "" if speed_m_s is None else f", {speed_m_s:.2g} m/s"
-    return "-" if depth_m is None else f"{depth_m / CM:.1f} cm{speed}"
 
 
 # several runs
@@ -306,39 +327,39 @@ def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result
     """Compare several runs: one table, one figure, and the differences to the first run."""
     labels, found = run_labels(runs, headlines), differences(runs, headlines)
     first = labels[runs[0].name]
-    shared = " The error that all strides of one robot share is left out: it moves its runs alike."
     compared = f"Every run compared with {first}. A difference is shown beyond {SHOWN:g} standard errors. {DEPTHS}"
-    compared += shared * (len({run.robot for run in runs}) == 1)
+    if len({run.robot for run in runs}) == 1:
+        compared += " The error that all strides of one robot share is left out: it moves its runs alike."
     texts = {
-        "Result": f"{' '.join(comparison_sentences(runs, headlines))}\n\n{UNCERTAINTY}",
+        "Result": f"{' '.join(_comparison_sentences(runs, headlines, labels, found))}\n\n{UNCERTAINTY}",
         "Differences": compared if found else f"No other run has a value in a mud of the same name as one of {first}.",
     }
     rows = []
-    for run, headline in zip(runs, headlines, strict=True):
+    for label, headline in zip(labels.values(), headlines, strict=True):
         faults = {"faults": f"{headline['stops']} stopped it" if headline["stops"] else "-"}
         muds = [{"mud": each["mud"]} | _mud_cells(each) for each in headline["muds"]]
-        rows += [
-            {"run": labels[run.name]} | each | faults for each in muds or [{"mud": "-", "strides": headline["strides"]}]
-        ]
-    results = _table("Result", rows)
-    empty = [name for name in results.rows if set(results.rows[name].fillna("-")) == {"-"}]
-    tables = [
-        Table("Result", "", UNITS, results.rows.drop(columns=empty)),
-        _table("Differences", _difference_rows(found, labels)),
-    ]
+        rows += [{"run": label} | each | faults for each in muds or [{"mud": "-", "strides": headline["strides"]}]]
+    results = DataFrame(rows, dtype=object)
+    empty = [name for name in results if set(results[name].fillna("-")) == {"-"}]
+    differences_table = _table("Differences", _difference_rows(found, labels))
+    tables = [Table("Result", "", UNITS, results.drop(columns=empty)), differences_table]
     has_muds = any(headline["muds"] for headline in headlines)
     figures = [Figure("comparison", COMPARED, partial(draw_comparison, runs, headlines))] * has_muds
-    tables = [table for table in tables if len(table.rows)]
-    return Result(tables, figures, title=f"Comparison of {len(runs)} runs", texts=texts)
+    described = [
+        {"run": run.name, "robot": run.robot, "headline": headline}
+        for run, headline in zip(runs, headlines, strict=True)
+    ]
+    summary = {"runs": described, "differences": found}
+    return Result(tables, figures, summary, f"Comparison of {len(runs)} runs", texts)
 
 
-def comparison_sentences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[str]:
+def _comparison_sentences(
+    runs: Sequence[Run], headlines: Sequence[Entry], labels: Mapping[str, str], found: Sequence[Entry]
+) -> list[str]:
     """Say how fast each run was, and how many differences are larger than their uncertainty."""
-    labels = run_labels(runs, headlines)
-    named = [(labels[run.name], headline) for run, headline in zip(runs, headlines, strict=True)]
+    named = list(zip(labels.values(), headlines, strict=True))
     known = [f"{name} {each['speed_m_s'] / CM:.1f} cm/s" for name, each in named if each["speed_m_s"] is not None]
     empty = [name for name, each in named if not each["strides"]]
-    found = differences(runs, headlines)
     shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {labels[runs[0].name]}"
     return [
         *end_sentences(runs),

@@ -23,7 +23,7 @@ from control.records import UNKNOWN
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
-from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
+from experiments.reports.coefficient_table import GatheredCoefficient, gather_rows
 from experiments.reports.counted_nouns import counted
 from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
@@ -121,20 +121,12 @@ def speed_of(strides: DataFrame) -> Entry:
 
 
 def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
-    by_name = {name: estimates[estimates["coefficient"] == name] for name in COEFFICIENTS}
-    return {name: gather_coefficient(own["estimate"]) for name, own in by_name.items()}
+    return {name: gather_rows(estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS}
 
 
 def _law_findings(estimates: DataFrame) -> list[str]:
     """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, do not."""
-    values = DataFrame(
-        [
-            {"coefficient": name} | estimate
-            for name, estimate in estimates[["coefficient", "estimate"]].itertuples(index=False)
-            if estimate["valid"] and not estimate["at_least"]
-        ],
-        columns=["coefficient", "value", "repeatability", "depth_m"],
-    ).astype({"value": float, "repeatability": float, "depth_m": float})
+    values = estimates[estimates["valid"] & ~estimates["at_least"]]
     findings = [law_finding(name, fit_depth_law(values[values["coefficient"] == name])) for name in COEFFICIENTS]
     return [finding for finding in findings if finding]
 

@@ -5,7 +5,7 @@ there (mud_layout.py), the mud of the log's trial, the label in the name of a CS
 the robot noticed, described by its k_p.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan
@@ -16,7 +16,7 @@ import numpy as np
 from pandas import DataFrame
 
 from control.records import FLIPPERS, UNKNOWN
-from estimation.strokes.fit_samples import FitSamples, StrideFits
+from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from experiments.lablogs.log_choice import LABEL
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_of_trace
@@ -37,8 +37,9 @@ from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
 STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces", "supply_v")
-PARTS = ("std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate, besides its value
-ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", "estimate", "samples")
+NUMBERS = ("value", "std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate; NaN where not known
+FLAGS = ("valid", "at_least")
+ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", *NUMBERS, *FLAGS, "reason", "samples")
 
 
 class MudsFrom(StrEnum):
@@ -100,7 +101,7 @@ def _read_run(
     if layout is None and named:
         layout = MudLayout((mud_name(named),), (inf,))
     layout = _placed(path, layout, walks)
-    strides, estimates = _describe_strides(replay, walks, layout)
+    strides = _describe_strides(walks, layout)
     return Run(
         name=path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap"),
         paths=paths,
@@ -110,8 +111,8 @@ def _read_run(
         layout=layout,
         muds_from=muds_from,
         walks=walks,
-        strides=DataFrame(strides, columns=list(STRIDES)),
-        estimates=DataFrame(estimates, columns=list(ESTIMATES)),
+        strides=strides,
+        estimates=_describe_estimates(replay, walks, strides),
         causes=read_causes(log.events, log.configuration_text) if log else [],
     )
 
@@ -135,53 +136,59 @@ def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk])
     return layout.beginning_at(float(known[0])) if len(known) else layout
 
 
-def _describe_strides(
-    replay: Replay, walks: Sequence[RecordedWalk], layout: MudLayout | None
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return the rows of STRIDES and of ESTIMATES."""
+def _describe_strides(walks: Sequence[RecordedWalk], layout: MudLayout | None) -> DataFrame:
+    """Return the rows of STRIDES."""
+    found = []
+    for number, walk in enumerate(walks, 1):
+        regions = mud_regions(walk, None) if layout is None else []
+        by_index: dict[int, list[Stride]] = {}
+        for row in sorted(walk.strides, key=lambda row: int(row["index"])):
+            by_index.setdefault(row["index"], []).append(row)
+        starts_s = [rows[0]["t_start_s"] for rows in by_index.values()]
+        for (index, rows), end_s in zip(by_index.items(), [*starts_s, UNKNOWN][1:], strict=True):
+            first = rows[0]
+            together = first | {"released": all(row["released"] for row in rows)}
+            found.append(
+                {
+                    "walk": number,
+                    "index": index,
+                    "mud": _mud_of(walk, layout, regions, first),
+                    "start_s": walk.begun_s + first["t_start_s"],
+                    "duration_s": end_s - first["t_start_s"],
+                    "step_m": first["step_m"],
+                    "depth_m": max(float(row["depth_m"]) for row in rows),
+                    "outcome": str(outcome_of(together, walk.geometric_step_m)),
+                    "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows),
+                    "supply_v": min((v for row in rows if isfinite(v := row.get("supply_min_v", nan))), default=nan),
+                }
+            )
+    return DataFrame(found, columns=list(STRIDES))
+
+
+def _describe_estimates(replay: Replay, walks: Sequence[RecordedWalk], strides: DataFrame) -> DataFrame:
+    """Return the rows of ESTIMATES, those of one stride together."""
     starts_s = [walk.begun_s for walk in walks]
     fits: dict[tuple[int, int, str], StrideFits] = {}
     for replayed, of_stride in zip(replay.strides, replay.fits, strict=True):
         number = int(np.searchsorted(starts_s, replayed.t_end_s - replay.begin_s))
         fits[number, replayed.index, replayed.flipper] = of_stride
-    strides, estimates = [], []
+    muds = {(number, index): mud for number, index, mud in strides[["walk", "index", "mud"]].itertuples(index=False)}
+    found = []
     for number, walk in enumerate(walks, 1):
-        regions = mud_regions(walk, None) if layout is None else []
-        by_index: dict[int, dict[str, Stride]] = {}
-        for row in sorted(walk.strides, key=lambda row: int(row["index"])):
-            by_index.setdefault(row["index"], {})[FLIPPERS[row["flipper"]]] = row
-        first_rows = [next(iter(rows.values())) for rows in by_index.values()]
-        ends_s = [*(first["t_start_s"] for first in first_rows), UNKNOWN][1:]
-        for (index, rows), first, end_s in zip(by_index.items(), first_rows, ends_s, strict=True):
-            mud = _mud_of(walk, layout, regions, first)
-            stride = {"walk": number, "index": index, "mud": mud}
-            strides.append(stride | _motion_of(walk, rows, first, end_s))
-            for flipper in (name for name in replay.flippers if name in rows):
-                found = fits.get((number, index, flipper))
-                for name in COEFFICIENTS:
-                    samples = getattr(found, name)() if found else None
-                    estimate = estimate_of_row(rows[flipper], name)
-                    of_flipper = {"flipper": flipper, "coefficient": name, "estimate": estimate}
-                    estimates.append(stride | of_flipper | {"samples": _if_same(samples, rows[flipper][name])})
-    return strides, estimates
+        for row in sorted(walk.strides, key=lambda row: (int(row["index"]), row["flipper"])):
+            index, flipper = row["index"], FLIPPERS[row["flipper"]]
+            own = {"walk": number, "index": index, "mud": muds[number, index], "flipper": flipper}
+            of_stride = fits.get((number, index, flipper), NO_FITS)
+            for name in COEFFICIENTS:
+                samples = getattr(of_stride, name)()
+                if not (samples and abs(samples.slope - row[name]) <= SAME * abs(row[name])):
+                    samples = None  # of a bound, or this version would estimate otherwise
+                found.append(own | estimate_of_row(row, name) | {"samples": samples})
+    return estimate_frame(found)
 
 
-def _motion_of(walk: RecordedWalk, rows: Mapping[str, Stride], first: Stride, end_s: float) -> dict[str, Any]:
-    together = first | {"released": all(row["released"] for row in rows.values())}
-    return {
-        "start_s": walk.begun_s + first["t_start_s"],
-        "duration_s": end_s - first["t_start_s"],
-        "step_m": first["step_m"],
-        "depth_m": max(float(row["depth_m"]) for row in rows.values()),
-        "outcome": str(outcome_of(together, walk.geometric_step_m)),
-        "supply_v": min((v for row in rows.values() if isfinite(v := row.get("supply_min_v", nan))), default=nan),
-        "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows.values()),
-    }
-
-
-def _if_same(samples: FitSamples | None, value: float) -> FitSamples | None:
-    """Return no samples of a bound, or where this version would estimate otherwise."""
-    return samples if samples and abs(samples.slope - value) <= SAME * abs(value) else None
+def estimate_frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
+    return DataFrame(rows, columns=list(ESTIMATES)).astype(dict.fromkeys(NUMBERS, float) | dict.fromkeys(FLAGS, bool))
 
 
 def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudRegion], row: Stride) -> str:
@@ -195,10 +202,10 @@ def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudR
 
 def estimate_of_row(row: Stride, name: str) -> dict[str, Any]:
     """Return one coefficient of a row as the daemon reports an estimate."""
-    numbers = {"value": float(row[name])} | {part: float(row.get(f"{name}_{part}", nan)) for part in PARTS}
-    value = numbers["value"]
-    return {key: number if isfinite(number) else None for key, number in numbers.items()} | {
-        "valid": bool(row[f"{name}_valid"]) and isfinite(value),
+    keys = (name, *(f"{name}_{part}" for part in NUMBERS[1:]))
+    numbers = {part: float(row.get(key, nan)) for part, key in zip(NUMBERS, keys, strict=True)}
+    return {"coefficient": name, **numbers} | {
+        "valid": bool(row[f"{name}_valid"]) and isfinite(numbers["value"]),
         "at_least": bool(row[f"{name}_at_least"]),
         "reason": "",
     }

@@ -10,7 +10,7 @@ from pandas import DataFrame
 from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.run_report.run import ESTIMATES, STRIDES, MudsFrom, Run
+from experiments.run_report.run import STRIDES, MudsFrom, Run, estimate_frame
 from logs.replay import Replay
 
 STD_ERROR = 0.04e6
@@ -34,7 +34,8 @@ def stride(
     estimates = [
         own
         | {"flipper": flipper, "coefficient": name, "samples": samples if name == "k_p" else None}
-        | {"estimate": {"value": value, "std_error": STD_ERROR, "valid": True, "at_least": False, "reason": ""} | flags}
+        | {"value": value, "std_error": STD_ERROR, "valid": True, "at_least": False, "reason": ""}
+        | flags
         for flipper, value in zip(FLIPPERS, (left, right), strict=True)
         for name in COEFFICIENTS
     ]
@@ -54,6 +55,6 @@ def run_of(
         muds_from=MudsFrom.NAMES,
         walks=[],
         strides=DataFrame([own for own, _ in strides], columns=list(STRIDES)),
-        estimates=DataFrame([each for _, own in strides for each in own], columns=list(ESTIMATES)),
+        estimates=estimate_frame([each for _, own in strides for each in own]),
         causes=[],
     )

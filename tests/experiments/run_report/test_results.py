@@ -18,12 +18,11 @@ from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import gather_coefficient
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.run_report.page import coefficient_cell, comparison_result, counts_cell
+from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
     differences,
     headline_of,
-    headline_sentences,
     is_shown,
     reaction_of,
     run_labels,
@@ -67,18 +66,13 @@ def test_each_stride_is_in_the_mud_in_which_the_plates_go_down(walked: tuple[Run
     muds = {"w = 48.5 %": (-1.0, 0.61), "w = 53.1 %": (0.61, 1.22)}
     named = run.strides[run.strides["mud"] != ""]
     assert 5 <= len(named) <= 7 and set(named["mud"]) == set(muds)
-    position_m = {row["index"]: row["position_m"] for row in run.walks[0].strides}
+    starts_s, position_m = run.strides["start_s"], {row["index"]: row["position_m"] for row in run.walks[0].strides}
+    assert run.strides["duration_s"][:-1].tolist() == pytest.approx(np.diff(starts_s).tolist())
     for mud, index in zip(named["mud"], named["index"], strict=True):
         begin_m, end_m = muds[mud]
         assert begin_m < position_m[index] + reach_m < end_m
     softest = {result["mud"]: result["both"]["k_p"].value for result in headline_of(run)["muds"]}
     assert softest["w = 53.1 %"] < 0.5 * softest["w = 48.5 %"]
-
-
-def test_a_stride_lasts_from_insertion_to_insertion(walked: tuple[Run, float]) -> None:
-    strides = walked[0].strides
-    assert strides["duration_s"][:-1].tolist() == pytest.approx(np.diff(strides["start_s"]).tolist())
-    assert np.isnan(strides["duration_s"].iloc[-1])
 
 
 def test_the_speed_of_a_mud_and_its_error_by_hand() -> None:
@@ -112,17 +106,15 @@ def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers_with_its_error_by
 
 
 def test_bounds_and_invalid_estimates_are_no_values() -> None:
-    strides = [stride("a", 0.5e6, 0.5e6, at_least=True), stride("b", 0.2e6, 0.2e6, valid=False)]
-    bounds, nothing = headline_of(run_of(strides))["muds"]
-    assert coefficient_cell(bounds["both"]["k_s"]) == "≥ 0.50" and coefficient_cell(nothing["both"]["k_s"]) == "-"
+    run = run_of([stride("a", 0.5e6, 0.5e6, at_least=True), stride("b", 0.2e6, 0.2e6, valid=False)])
+    assert report_of([run]).tables[0].rows["k_s"].tolist() == ["≥ 0.50", "-"]
 
 
 def test_outcomes_are_counted() -> None:
     outcomes = [Outcome.GOOD, Outcome.GOOD, Outcome.SLIPPING, Outcome.STUCK]
-    run = run_of([stride("a", outcome=outcome) for outcome in outcomes])
-    headline = headline_of(run)
-    assert counts_cell(headline["outcomes"]) == "2 / 1 / 1"
-    assert headline_sentences(run, headline)[1] == "4 strides: 2 good, 1 slipped, 1 stuck."
+    result = report_of([run_of([stride("a", outcome=outcome) for outcome in outcomes])])
+    assert result.tables[0].rows["good / slipped / stuck"].tolist() == ["2 / 1 / 1"]
+    assert "4 strides: 2 good, 1 slipped, 1 stuck." in result.texts["Result"]
 
 
 def test_the_hardest_reaction_to_a_cause_counts() -> None:
