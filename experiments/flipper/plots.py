@@ -84,16 +84,14 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
 
 def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry]) -> Figure:
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
-    compared = any(mud["truth"] for mud in muds)
-    rows = 3 if compared else 2
+    rows = 3 if any(mud["truth"] for mud in muds) else 2
     figure = Figure(figsize=(11.0, 3.3 * rows + 0.5))
     panels = figure.subplots(rows, 3)
     looks = looks_of([mud["mud"] for mud in muds])
     _draw_curves(panels[0], firsts, looks)
-    for column, name in enumerate(COEFFICIENTS):
-        _draw_by_mud(panels[1][column], muds, name, looks)
-        if compared:
-            _draw_compared(panels[2][column], muds, name, looks)
+    for column, name in zip(panels[1:].T, COEFFICIENTS, strict=True):
+        for draw, panel in zip((_draw_by_mud, _draw_compared), column, strict=False):
+            draw(panel, muds, name, looks)
     for letter, panel in zip("ABCDEFGHI", panels.flat, strict=False):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
     handles, labels = panels[0][0].get_legend_handles_labels()
@@ -132,9 +130,8 @@ def _draw_by_mud(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[st
         panel.plot([x] * len(trials), trials, "_", color=GREY, markersize=12)
         panel.errorbar(x, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=gathered.at_least,
                        **mark_of(look))  # fmt: skip
-    panel.set_ylim(bottom=0.0)
-    panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
-    panel.set_xlabel("water content $w$ (%)" if waters else "mud")
+    xlabel = "water content $w$ (%)" if waters else "mud"
+    panel.set(ylim=(0.0, None), xlabel=xlabel, ylabel=f"{LABELS[name]} (N/cm³)")
     if not waters:
         panel.set_xticks(range(len(names)), names)
 
@@ -151,6 +148,5 @@ def _draw_compared(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[
                        lolims=gathered.at_least, **mark_of(looks[mud["mud"]]))  # fmt: skip
         largest = max(largest, value + uncertainty, PER_CM3 * truth)
     panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
-    panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
-    panel.set_ylabel("by the flipper (N/cm³)")
+    panel.set(xlabel=f"{LABELS[name]} by load cell (N/cm³)", ylabel="by the flipper (N/cm³)")
     panel.legend(fontsize="small", loc="upper left")

@@ -25,10 +25,10 @@ from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
-from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import (
+    LATENCY_S,
     MEASURING_WALK,
     SINGLE,
     TORQUE_ERROR,

@@ -2,11 +2,18 @@
 
 Robot, drives and mud run in lockstep with the daemon's own loop, frames included; the samples are those of the loop's
 estimator. So any number of methods can be evaluated on the same trial.
+
+The samples may have a latency between current and angle, as a log has whose drives report one later than the other. It
+disturbs the samples, not the control. The authors' rows change angles and currents together, so a difference within a
+gap between their 50 to 210 distinct states a second cannot be seen in a log. Eight values are read one after another in
+such a gap, so those of one joint are at most half of it apart: 2.6 ms at 190 a second.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, repeat
 from random import Random
+from typing import NamedTuple
 
 from control.controller import WalkOrder
 from control.gait.gait import MEASURING, SINGLE_FLIPPER
@@ -14,13 +21,12 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
-from control.records import BodyPose, StrideEstimate
+from control.records import BodyPose, DriveStates, Phase, StrideEstimate
 from drivers.drive_types import DEFAULT
 from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import MudEstimator
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.trials.latency import Sample, drawn_latency_s, with_latency
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
@@ -30,6 +36,17 @@ from simulation.mud.track import Track
 BENCH_TORQUE_NM, BENCH_CURRENT_A = 1.65, 20.0  # the authors' drives in their trials with a single flipper
 LONGEST_STRIDE_S = 40.0
 TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
+LATENCY_S = 0.0026  # the largest
+CONSTANTS = ("sweep_constant_nm_a", "adduction_constant_nm_a")
+
+
+class Sample(NamedTuple):
+    """The estimator's input in one tick."""
+
+    now_s: float
+    phase: Phase
+    states: DriveStates
+    body: BodyPose
 
 
 @dataclass(frozen=True)
@@ -94,9 +111,36 @@ def run_trial(
         lockstep.step()
         samples.append(_sample_of(lockstep))
         truths += reference.step(PERIOD_S, lockstep.robot.plant, samples[-1].phase)
-    samples = with_latency(samples, drawn_latency_s(latency_s, seed))
-    rows = rows_of(first, samples, setup.row_period_s)
-    return Trial(configuration, _known_drives(configuration, torque_error, seed), rows, truths)
+    samples = with_latency(samples, Random(f"latency {seed}").uniform(-latency_s, latency_s))
+    random, drives = Random(seed), list(configuration.flipper_drives)
+    for i, drive in enumerate(drives):
+        known = {name: getattr(drive, name) * (1.0 + random.gauss(0.0, torque_error)) for name in CONSTANTS}
+        drives[i] = drive._replace(**known)
+    return Trial(configuration, tuple(drives), rows_of(first, samples, setup.row_period_s), truths)
+
+
+def _sample_of(lockstep: Lockstep) -> Sample:
+    loop = lockstep.loop
+    return Sample(lockstep.now_s, loop.target.phase, loop.states, loop.body)
+
+
+def with_latency(samples: Sequence[Sample], current_late_s: float) -> list[Sample]:
+    """Return the samples with late currents, or with late angles where it is negative, to the nearest tick.
+
+    A late value is stamped with its late arrival.
+    """
+    ticks = round(abs(current_late_s) / PERIOD_S)
+    late, stamp = ("current_a",), "current_stamp_s"
+    if current_late_s < 0.0:
+        late, stamp = ("angle_rad", "velocity_rad_s"), "angle_stamp_s"
+    delayed = []
+    for sample, earlier in zip(samples, chain(repeat(samples[0], ticks), samples), strict=False):
+        delay_s, states = sample.now_s - earlier.now_s, []
+        for state, was in zip(sample.states, earlier.states, strict=True):
+            changes = {name: getattr(was, name) for name in late} | {stamp: getattr(was, stamp) + delay_s}
+            states.append(state._replace(**changes))
+        delayed.append(sample._replace(states=DriveStates(*states)))
+    return delayed
 
 
 def rows_of(first: Sample, samples: Sequence[Sample], row_period_s: float) -> list[Sample]:
@@ -107,22 +151,6 @@ def rows_of(first: Sample, samples: Sequence[Sample], row_period_s: float) -> li
             held = sample
         rows.append(held._replace(now_s=sample.now_s, phase=sample.phase))
     return rows
-
-
-def _known_drives(configuration: Configuration, torque_error: float, seed: int) -> tuple[FlipperDrive, ...]:
-    random = Random(seed)
-    return tuple(
-        drive._replace(
-            sweep_constant_nm_a=drive.sweep_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
-            adduction_constant_nm_a=drive.adduction_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
-        )
-        for drive in configuration.flipper_drives
-    )
-
-
-def _sample_of(lockstep: Lockstep) -> Sample:
-    loop = lockstep.loop
-    return Sample(lockstep.now_s, loop.target.phase, loop.states, loop.body)
 
 
 def replay_trial(

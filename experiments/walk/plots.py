@@ -30,10 +30,12 @@ METHOD_STYLES: dict[str, dict[str, Any]] = {
     PAPER: {"color": "tab:red", "marker": "x"},
     COMPENSATED: {"color": "tab:orange", "marker": "+"},
 }
+LOAD_CELL = "load cell"
 BARS = {
     KNOWN: ("paper's law", None),  # in the colour of its depth, as in the paper
     KNOWN_COMPENSATED: ("paper's law\nwith drag", "tab:green"),
     DEFAULT: ("default", "tab:purple"),
+    LOAD_CELL: ("load cell", "#d9d9d9"),
 }
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
 HEADROOM = 2.0  # height of a panel over the largest true or own value; higher values are drawn at the edge
@@ -69,7 +71,7 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: f
         panel.set_ylabel(label)
         panel.legend(ncols=3, **LEGEND)
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
-        _draw_coefficient(panel, plan, name, own[own["coefficient"] == name], begun_s)
+        _draw_coefficient(panel, name, own[own["coefficient"] == name], begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
@@ -92,7 +94,7 @@ def _borders_s(plan: WalkTrials, walk: Entry, profile: DataFrame, own: DataFrame
     return list(chain.from_iterable(beyond_s))
 
 
-def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: DataFrame, begun_s: float) -> None:
+def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) -> None:
     """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
     methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
     valid = own[own["method"].isin(methods) & own["valid"].astype(bool)]
@@ -104,27 +106,18 @@ def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: DataFrame, 
         marker = "^" if each.at_least else ("$\\uparrow$" if value > top else style["marker"])
         panel.errorbar(each.t_end_s - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
                        color=style["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
-    _draw_truth(panel, plan, own, begun_s)
+    known = own[own["truth"].notna() & (own["mud"] != "")]
+    for number, (_, there) in enumerate(known.groupby("mud", sort=False)):
+        level = PER_CM3 * there["truth"].median()
+        times_s = there["t_start_s"].min() - begun_s, there["t_end_s"].max() - begun_s
+        label = "_" if number else "load cell"
+        panel.plot(times_s, [level, level], "--", color=GREY, linewidth=1.8, label=label)
     for method in methods:
-        style = METHOD_STYLES[method]
-        panel.plot([], [], color=style["color"], marker=style["marker"], linestyle="", label=method)
+        panel.plot([], [], linestyle="", label=method, **METHOD_STYLES[method])
     if valid["at_least"].any():
-        panel.plot([], [], color=METHOD_STYLES[DEFAULT]["color"], marker="^", linestyle="", label="lower bound")
-    panel.set_ylim(0.0, top)
-    panel.set_ylabel(f"{LABELS[name]}\n(N/cm³)")
+        panel.plot([], [], linestyle="", label="lower bound", **METHOD_STYLES[DEFAULT] | {"marker": "^"})
+    panel.set(ylim=(0.0, top), ylabel=f"{LABELS[name]}\n(N/cm³)")
     panel.legend(ncols=5, **LEGEND)
-
-
-def _draw_truth(panel: Axes, plan: WalkTrials, own: DataFrame, begun_s: float) -> None:
-    """Draw the load cell's values over each mud, from its first stride to its last."""
-    label = "load cell"
-    for mud, _ in plan.muds:
-        there = own[(own["mud"] == mud) & own["truth"].notna()]
-        if len(there):
-            level = PER_CM3 * there["truth"].median()
-            start_s, end_s = there["t_start_s"].min() - begun_s, there["t_end_s"].max() - begun_s
-            panel.plot([start_s, end_s], [level, level], "--", color=GREY, linewidth=1.8, label=label)
-            label = "_"
 
 
 # figure 7
@@ -135,55 +128,43 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     figure = Figure(figsize=(11.0, 4.2))
     forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
     for depth_cm, trials in walks.items():
-        _draw_stance(forces, depth_cm, trials[0])
+        stance, label = stroke_of(profile_from(trials[0]), Phase.STANCE), f"z = {depth_cm:g} cm"
+        time_s = stance["time_s"] - stance["time_s"].min()
+        forces.plot(time_s, stance["force_x_n"], linewidth=1.4, label=label, **_style_of(depth_cm))
     forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
                    label=f"half of the paper's {PAPER_DRAG_N:g} N of body drag")  # fmt: skip
-    forces.set_xlabel("time in stance (s)")
-    forces.set_ylabel("$f_x$ of one flipper (N)")
-    forces.set_ylim(bottom=0.0)
+    forces.set(xlabel="time in stance (s)", ylabel="$f_x$ of one flipper (N)", ylim=(0.0, None))
     forces.legend(fontsize="small", loc="lower right")
     forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
-    _draw_bars(bars, soft)
-    return figure
-
-
-def _draw_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
-    stance, style = stroke_of(profile_from(trial), Phase.STANCE), DEPTH_STYLES.get(depth_cm, {"color": INK})
-    time_s = stance["time_s"] - stance["time_s"].min()
-    panel.plot(time_s, stance["force_x_n"], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
-
-
-def _draw_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
-    """Draw k_s by the paper's law, the default method and the load cell; a lower bound is hatched."""
     deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
     names: list[str] = []
     for method, (label, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
-            own = DEPTH_STYLES.get(each["depth_cm"], {"color": INK})["color"]
-            gathered = each["k_s"].get(method)
-            _draw_bar(panel, len(names), gathered.value if gathered else None, colour or own, gathered)
+            found = each["truth"] if method == LOAD_CELL else each["k_s"].get(method)
+            _draw_bar(bars, len(names), found, colour or _style_of(each["depth_cm"])["color"])
             names.append(f"{label}\n{each['depth_cm']:g} cm")
-    for each in deepest_first:
-        _draw_bar(panel, len(names), each["truth"], "#d9d9d9")
-        names.append(f"load cell\n{each['depth_cm']:g} cm")
-    panel.set_xticks(range(len(names)), names, fontsize="small")
-    panel.set_ylabel("$k_s$ (N/cm³)")
-    panel.margins(y=0.12)
-    panel.set_ylim(bottom=0.0)
-    panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
+    bars.set_xticks(range(len(names)), names, fontsize="small")
+    bars.margins(y=0.12)
+    bars.set(ylabel="$k_s$ (N/cm³)", ylim=(0.0, None))
+    bars.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
+    return figure
 
 
-def _draw_bar(
-    panel: Axes, x: int, value_n_m3: float | None, colour: str, gathered: GatheredCoefficient | None = None
-) -> None:
-    """Draw a value, with the standard deviation of the trials from which it was gathered."""
-    if value_n_m3 is None:
+def _style_of(depth_cm: float) -> dict[str, Any]:
+    return DEPTH_STYLES.get(depth_cm, {"color": INK})
+
+
+def _draw_bar(panel: Axes, x: int, found: GatheredCoefficient | float | None, colour: str) -> None:
+    """Draw a value, with the standard deviation of the trials from which it was gathered; a lower bound is hatched."""
+    gathered = found if isinstance(found, GatheredCoefficient) else None
+    value_n_m3 = gathered.value if gathered else found
+    if not isinstance(value_n_m3, float):
         panel.text(x, 0.0, "-", ha="center", va="bottom")
         return
     value, bound = PER_CM3 * value_n_m3, gathered is not None and gathered.at_least
     sd = value * (gathered.repeatability or 0.0) if gathered else 0.0
-    panel.bar(x, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
-              hatch="//" if bound else "")  # fmt: skip
+    look = {"color": "white", "edgecolor": colour, "hatch": "//"} if bound else {"color": colour, "edgecolor": INK}
+    panel.bar(x, value, 0.7, linewidth=1.0, **look)
     if sd:
         panel.errorbar(x, value, sd, color=INK, capsize=4, linestyle="")
     text = f"{'≥ ' if bound else ''}{value:.3f}"

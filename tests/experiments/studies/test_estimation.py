@@ -24,8 +24,7 @@ from experiments.studies.estimation import (
 )
 from experiments.study.option import OptionError
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.latency import LATENCY_S
-from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING
+from experiments.trials.trial import LATENCY_S, SINGLE, TORQUE_ERROR, WALKING
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import NONE
 from tests.experiments.studies.synthetic_trials import SyntheticTrials

@@ -7,7 +7,7 @@ import pytest
 
 from control.rate import PERIOD_S
 from control.records import BodyPose, DriveState, Phase, same_for_all
-from experiments.trials.latency import Sample, with_latency
+from experiments.trials.trial import Sample, with_latency
 
 RATE_RAD_S = 3.0
 

@@ -10,9 +10,9 @@ import pytest
 from control.records import FLIPPERS
 from estimation.estimation_parameters import EstimationParameters
 from estimation.mud import MudEstimator
-from experiments.trials.latency import Sample
 from experiments.trials.trial import (
     WALKING,
+    Sample,
     Setup,
     Trial,
     configuration_of,
