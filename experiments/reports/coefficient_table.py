@@ -70,9 +70,9 @@ class GatheredCoefficient:
     not_valid: Sequence[str]  # why trials report nothing
 
 
-def gather_coefficient(estimates: Iterable[EstimateReport]) -> GatheredCoefficient:
+def gather_coefficient(estimates: DataFrame | Iterable[EstimateReport]) -> GatheredCoefficient:
     """Combine the trials of one coefficient in one mud."""
-    reports = list(estimates)
+    reports = estimates.to_dict("records") if isinstance(estimates, DataFrame) else list(estimates)
     valid = [each for each in reports if each["valid"]]
     bounds = sum(each["at_least"] for each in valid)
     at_least = 2 * bounds > len(valid)
@@ -100,14 +100,10 @@ def mud_summaries(
     own = {mud: rows[(rows["mud"] == mud) & (rows["method"] == method)] for mud in muds}
     return [
         {"mud": mud}
-        | {name: gather_rows(each[each["coefficient"] == name]) for name in COEFFICIENTS}
+        | {name: gather_coefficient(each[each["coefficient"] == name]) for name in COEFFICIENTS}
         | {"truth": average_truth(each, average) or None}
         for mud, each in own.items()
     ]
-
-
-def gather_rows(rows: DataFrame) -> GatheredCoefficient:
-    return gather_coefficient(rows.to_dict("records"))
 
 
 def average_truth(rows: DataFrame, average: Callable[[Sequence[float]], float]) -> dict[str, float]:
@@ -118,22 +114,19 @@ def average_truth(rows: DataFrame, average: Callable[[Sequence[float]], float]) 
 
 def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[float | None, float | None, float | None]:
     """Return the standard error, and its parts from the trials and shared by them; bounds have none."""
-    known = [error for each in values if (error := each["std_error"]) is not None and isfinite(error)]
+    known, own = (
+        [error for each in values if (error := each.get(name)) is not None and isfinite(error)]
+        for name in ("std_error", "repeatability")
+    )
     if spread is None or not values:
         return (known[0] if known else None), None, None
     trials_error = student_factor(len(values) - 1) * spread / sqrt(len(values))
-    alike = TORQUE_CONSTANT_UNCERTAINTY * fmean(each["value"] for each in values)
-    shared_error = max(sqrt(_shared_variance(values, known, spread)), alike)
+    alike, shared_variance = TORQUE_CONSTANT_UNCERTAINTY * fmean(each["value"] for each in values), 0.0
+    if known:  # of logs without repeatability, what the trials' scatter leaves
+        own_variance = fmean(error**2 for error in own) if len(own) == len(known) else spread**2
+        shared_variance = max(0.0, fmean(error**2 for error in known) - own_variance)
+    shared_error = max(sqrt(shared_variance), alike)
     return hypot(trials_error, shared_error), trials_error, shared_error
-
-
-def _shared_variance(values: Sequence[EstimateReport], known: Sequence[float], spread: float) -> float:
-    """Return what the trials' errors have in common; of logs without repeatability, what their scatter leaves."""
-    own = [error for each in values if (error := each.get("repeatability")) is not None and isfinite(error)]
-    if not known:
-        return 0.0
-    own_variance = fmean(error**2 for error in own) if len(own) == len(known) else spread**2
-    return max(0.0, fmean(error**2 for error in known) - own_variance)
 
 
 def error_table(rows: DataFrame, setup: str) -> list[Row]:

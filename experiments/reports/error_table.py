@@ -64,25 +64,24 @@ def _statistic(function: Any, values: Any) -> float | None:
 
 
 def plate_rows(evaluations: DataFrame) -> list[Row]:
-    """Compare the default method's estimates with both plates, for setups without a changed disturbance."""
+    """Compare the default method's estimates with both plates, for setups without a changed disturbance.
+
+    A row says how the lean of the flipper's plate explains the difference to the paper's upright plate. The lean's
+    fraction is of the sizes of two differences, which may cancel each other.
+    """
     if not len(evaluations):
         return []
     own = evaluations[(evaluations["method"] == "default") & evaluations["upright"].notna()]
     own = own[~own["setup"].str.contains("without")]
-    return [dict(zip(KEYS, key, strict=False)) | _plates(group) for key, group in own.groupby(KEYS[:3], sort=False)]
-
-
-def _plates(group: DataFrame) -> Row:
-    """Return how the lean of the flipper's plate explains the difference to the paper's upright plate.
-
-    The lean's fraction is of the sizes of two differences, which may cancel each other.
-    """
-    values = group[group["kind"] == "value"]
-    leaning = float(np.median(group["truth"] / group["upright"]))
-    row: Row = {"upright_over_leaning": round(1.0 / leaning, 4), "estimate_over_upright": None, "lean_fraction": None}
-    if len(values):
-        estimate = float(np.median(values["value"] / values["upright"]))
-        lean, both = abs(leaning - 1.0), abs(leaning - 1.0) + abs(estimate - leaning)
-        row["estimate_over_upright"] = round(estimate, 4)
-        row["lean_fraction"] = round(lean / both if both > 0.0 else 0.0, 4)
-    return row
+    rows: list[Row] = []
+    for key, group in own.groupby(KEYS[:3], sort=False):
+        values, leaning = group[group["kind"] == "value"], float(np.median(group["truth"] / group["upright"]))
+        row: Row = dict(zip(KEYS, key, strict=False)) | {"upright_over_leaning": round(1.0 / leaning, 4)}
+        row |= {"estimate_over_upright": None, "lean_fraction": None}
+        if len(values):
+            estimate = float(np.median(values["value"] / values["upright"]))
+            lean, both = abs(leaning - 1.0), abs(leaning - 1.0) + abs(estimate - leaning)
+            row["estimate_over_upright"] = round(estimate, 4)
+            row["lean_fraction"] = round(lean / both if both > 0.0 else 0.0, 4)
+        rows.append(row)
+    return rows

@@ -35,7 +35,7 @@ from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.clay import MUDS
 
 DAMPINGS_N_S_M = (4.0, 5.0, 6.0, 7.0, 8.0)
-WEAKEST_PA, STRONGEST_PA, RATIO = 400.0, 5000.0, 1.12  # the ratio is that of neighbouring strengths
+STRENGTHS_PA = [round(400.0 * 1.12**i) for i in range(23)]  # to 5000 Pa
 FINER_DAMPINGS_N_S_M = (-0.5, 0.0, 0.5)  # from the best
 FINER_RATIOS = (0.94, 0.97, 1.0, 1.03, 1.06)  # to the best strength
 GROUND = ["rail_damping_n_s_m", "strength_pa"]
@@ -51,17 +51,10 @@ def study(trials: Trials, *, seeds: Annotated[int, Option("walks of each point",
         "strength_pa": {mud: clay.strength_pa for mud, clay in MUDS.items()},
     }
     first = [(present["rail_damping_n_s_m"], strength_pa) for strength_pa in present["strength_pa"].values()]
-    coarse = _chi2(_speeds(trials, [*first, *product(DAMPINGS_N_S_M, _strengths_pa())], seeds))
+    coarse = _chi2(_speeds(trials, [*first, *product(DAMPINGS_N_S_M, STRENGTHS_PA)], seeds))
     speeds = _speeds(trials, _finer_grounds(best_fit(coarse)), seeds)
     speeds = concat([coarse, _chi2(speeds)])
     return result_of(speeds[~speeds.index.duplicated()], present, seeds)
-
-
-def _strengths_pa() -> list[float]:
-    strengths_pa = [WEAKEST_PA]
-    while strengths_pa[-1] * RATIO <= STRONGEST_PA:
-        strengths_pa.append(strengths_pa[-1] * RATIO)
-    return [round(strength_pa) for strength_pa in strengths_pa]
 
 
 def _finer_grounds(fit: Fit) -> Iterable[Ground]:

@@ -24,10 +24,6 @@ CONNECT_S = 10.0
 MOST_SUBMITTED = 1000  # trials at the scheduler at once; more than a cluster has processors
 
 
-class OtherProgramError(Exception):
-    """A worker runs another program; the text names both."""
-
-
 class ClusterWorkers:
     """The workers of the scheduler at an address such as tcp://10.0.0.7:8786."""
 
@@ -50,7 +46,7 @@ class ClusterWorkers:
 
 
 def _run(program: Record, modules: Sequence[str], index: int, trial: Callable[[], Result]) -> tuple[int, Result]:
-    """Run a trial on a worker. Raises OtherProgramError."""
+    """Run a trial on a worker. Raises WorkersError where it runs another program."""
     _require_same("a worker", identity(*modules), program)
     return index, trial()
 
@@ -68,8 +64,6 @@ def _connected(address: str) -> Iterator[Client]:
     with client:
         try:
             yield client
-        except OtherProgramError as problem:
-            raise WorkersError(str(problem)) from None
         except KilledWorker as problem:
             raise WorkersError(f"the cluster at {address} gave up a trial that ended its workers: {problem}") from None
         except (CancelledError, CommClosedError) as problem:
@@ -77,7 +71,7 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 def _require_this_program(client: Client, modules: Sequence[str]) -> None:
-    """Raises WorkersError where there is no worker, OtherProgramError where one runs another program."""
+    """Raises WorkersError where there is no worker, or one that runs another program."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
     except TimeoutError:
@@ -90,10 +84,10 @@ def _require_this_program(client: Client, modules: Sequence[str]) -> None:
 
 
 def _require_same(worker: str, found: Record | Exception, expected: Record) -> None:
-    """`found` is an exception where the worker could not answer. Raises OtherProgramError."""
+    """`found` is an exception where the worker could not answer. Raises WorkersError."""
     if found != expected:
         runs = str(found) if isinstance(found, Exception) else program_text(found)
-        raise OtherProgramError(
+        raise WorkersError(
             f"{worker} runs {runs}, and this is {program_text(expected)}: install the same version of mudskipper on all"
             " workers"
         )

@@ -7,7 +7,7 @@ experiment continues: options, version and sources, the configuration and the wo
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,9 @@ class Notebook:
         self.plan = json.loads(json.dumps(_flat(plan), default=str))  # as it reads back
         self.entries: dict[str, Entry] = {}
         contents = self.path.read_bytes() if self.path.exists() else b""
-        if _is_unbegun(contents):
+        plan_line, _, rest = contents.partition(b"\n")
+        # without a line after the plan, or a complete plan, another one may begin
+        if not rest.strip() and (not plan_line.strip() or plan_line.startswith(b'{"plan"')):
             self.path.write_bytes(b"")
             self._append({"plan": self.plan})
         else:
@@ -63,28 +65,29 @@ class Notebook:
         if not contents.endswith(b"\n"):
             with self.path.open("ab") as file:
                 file.write(b"\n")  # the next entry begins a line
-        lines = [line for line in map(_decode, contents.splitlines()) if line is not None]
-        if not lines or "plan" not in lines[0]:
+        first, *lines = [line for line in map(_decode, contents.splitlines()) if line is not None] or [{}]
+        if "plan" not in first:
             raise NotebookError(f"{self.path} is no notebook of an experiment: choose another folder with --out")
-        self._require_plan(lines[0]["plan"])
-        for line in lines[1:]:
-            self._apply(line)
+        self._require_plan(first["plan"])
+        for line in lines:
+            key, entry = line.get("key"), line.get("entry")
+            if isinstance(entry, dict):
+                self.entries[str(key)] = entry
+            else:
+                self.entries.pop(str(key), None)
 
     def _require_plan(self, earlier: Entry) -> None:
         different = sorted(name for name in {*earlier, *self.plan} if earlier.get(name) != self.plan.get(name))
         if different:
-            then, now = (_list_values(plan, different) for plan in (earlier, self.plan))
+            then, now = (
+                ", ".join(f"{name} = {plan.get(name, '(none)')}" for name in different[:SHOWN_DIFFERENCES])
+                + ", ..." * (len(different) > SHOWN_DIFFERENCES)
+                for plan in (earlier, self.plan)
+            )
             raise NotebookError(
                 f"{self.path.parent} has measurements with {then}, and now there is {now}: continue with the same, "
                 "choose another folder with --out, or begin again with --restart, which renames this folder"
             )
-
-    def _apply(self, line: Entry) -> None:
-        key, entry = line.get("key"), line.get("entry")
-        if isinstance(key, str) and isinstance(entry, dict):
-            self.entries[key] = entry
-        elif isinstance(key, str):
-            self.entries.pop(key, None)
 
 
 def count_entries(folder: Path) -> int:
@@ -97,12 +100,6 @@ def plan_in(folder: Path) -> Entry:
     for notebook in sorted(folder.rglob(NAME)):
         return dict((_decode(notebook.read_bytes().partition(b"\n")[0]) or {}).get("plan", {}))
     return {}
-
-
-def _is_unbegun(contents: bytes) -> bool:
-    """Return whether there is no line after the plan, or not even a complete plan."""
-    plan, _, rest = contents.partition(b"\n")
-    return not rest.strip() and (not plan.strip() or plan.startswith(b'{"plan"'))
 
 
 def _decode(line: bytes) -> Entry | None:
@@ -120,8 +117,3 @@ def _flat(tables: Mapping[str, Any], path: str = "") -> Entry:
     for name, value in tables.items():
         flat |= _flat(value, f"{path}{name}.") if isinstance(value, Mapping) else {f"{path}{name}": value}
     return flat
-
-
-def _list_values(plan: Entry, names: Sequence[str]) -> str:
-    shown = [f"{name} = {plan.get(name, '(none)')}" for name in names[:SHOWN_DIFFERENCES]]
-    return ", ".join([*shown, *(["..."] if len(names) > SHOWN_DIFFERENCES else [])])

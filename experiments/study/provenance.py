@@ -9,7 +9,7 @@ name is not found.
 import ast
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
@@ -53,10 +53,9 @@ def source_digest(*modules: str) -> str:
     left = list(modules)
     while left:
         module = left.pop()
-        source = None if module in texts else _source(module)
-        if source is not None:
-            texts[module] = source[0]
-            left += source[1]
+        if module not in texts and (text := _text_of(module)) is not None:
+            texts[module] = text
+            left += [module.rpartition(".")[0], *_imports(module)]
     if unknown := set(modules) - set(texts):
         raise ValueError(f"{', '.join(sorted(unknown))}: no module of {PACKAGE}")
     digest = sha256()
@@ -66,22 +65,20 @@ def source_digest(*modules: str) -> str:
 
 
 @cache
-def _source(module: str) -> tuple[bytes, list[str]] | None:
-    """Return text and imports of a module as it was when it was first asked for; None for one of another product."""
-    if module.partition(".")[0] not in PACKAGES:
-        return None
+def _text_of(module: str) -> bytes | None:
+    """Return the text of a module as it was when it was first asked for; None for one of another product."""
     path = ROOT.joinpath(*module.split("."))
-    for file in (path / "__init__.py", path.with_suffix(".py")):
-        if file.is_file():
-            text = file.read_bytes()
-            return text, [module.rpartition(".")[0], *_imports(text)]
-    return None
+    files = (path / "__init__.py", path.with_suffix(".py")) if module.partition(".")[0] in PACKAGES else ()
+    return next((file.read_bytes() for file in files if file.is_file()), None)
 
 
-def _imports(text: bytes) -> Iterator[str]:
-    """Yield every name that may be a module; of `from a import b` that is a, and also a.b."""
-    for node in ast.walk(ast.parse(text)):
+@cache
+def _imports(module: str) -> list[str]:
+    """Return every name that may be a module; of `from a import b` that is a, and also a.b."""
+    found = []
+    for node in ast.walk(ast.parse(_text_of(module) or b"")):
         if isinstance(node, ast.Import):
-            yield from (each.name for each in node.names)
+            found += [each.name for each in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield from (node.module, *(f"{node.module}.{each.name}" for each in node.names))
+            found += [node.module, *(f"{node.module}.{each.name}" for each in node.names)]
+    return found

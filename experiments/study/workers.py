@@ -87,8 +87,11 @@ def run_parallel(
 
 @contextmanager
 def _pool(processes: int | None) -> Iterator[ProcessPoolExecutor]:
-    """Make processes that end with the work, also after Ctrl-C."""
-    pool = ProcessPoolExecutor(processes, initializer=_ignore_interrupts)
+    """Make processes that end with the work, also after Ctrl-C.
+
+    Ctrl-C reaches every process of a terminal; a worker would end its trial and begin the next.
+    """
+    pool = ProcessPoolExecutor(processes, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
     try:
         yield pool
     except BaseException:
@@ -97,8 +100,3 @@ def _pool(processes: int | None) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches every process of a terminal; a worker would end its trial and begin the next."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

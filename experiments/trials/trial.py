@@ -130,9 +130,9 @@ def with_latency(samples: Sequence[Sample], current_late_s: float) -> list[Sampl
     A late value is stamped with its late arrival.
     """
     ticks = round(abs(current_late_s) / PERIOD_S)
-    late, stamp = ("current_a",), "current_stamp_s"
+    late, stamp = ["current_a"], "current_stamp_s"
     if current_late_s < 0.0:
-        late, stamp = ("angle_rad", "velocity_rad_s"), "angle_stamp_s"
+        late, stamp = ["angle_rad", "velocity_rad_s"], "angle_stamp_s"
     delayed = []
     for sample, earlier in zip(samples, chain(repeat(samples[0], ticks), samples), strict=False):
         delay_s, states = sample.now_s - earlier.now_s, []

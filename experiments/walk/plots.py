@@ -163,7 +163,9 @@ def _draw_bar(panel: Axes, x: int, found: GatheredCoefficient | float | None, co
         return
     value, bound = PER_CM3 * value_n_m3, gathered is not None and gathered.at_least
     sd = value * (gathered.repeatability or 0.0) if gathered else 0.0
-    look = {"color": "white", "edgecolor": colour, "hatch": "//"} if bound else {"color": colour, "edgecolor": INK}
+    look: dict[str, Any] = (
+        {"color": "white", "edgecolor": colour, "hatch": "//"} if bound else {"color": colour, "edgecolor": INK}
+    )
     panel.bar(x, value, 0.7, linewidth=1.0, **look)
     if sd:
         panel.errorbar(x, value, sd, color=INK, capsize=4, linestyle="")

@@ -21,7 +21,7 @@ from experiments.reports.coefficient_table import (
     compared_frame,
     compared_rows,
     error_table,
-    gather_rows,
+    gather_coefficient,
     mud_summaries,
 )
 from experiments.reports.counted_nouns import counted
@@ -132,7 +132,7 @@ def compared_strides(
 
     def add(mud: str, walk: Entry, method: str, stride: Mapping[str, Any], name: str = "", **keys: Any) -> None:
         known = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
-        rows.extend(compared_rows(stride, known, mud=name or mud, method=method, trial=walk["trial"], **keys))
+        rows.extend(compared_rows(stride, known, mud=name or mud, method=method, **keys))
 
     for walk in walks_of(plan, entries):
         for method, strides in walk["strides"].items():
@@ -141,7 +141,7 @@ def compared_strides(
                 if stride["place_m"] is not None and walk["start_m"] is not None:
                     plates_m = stride["place_m"] - walk["start_m"] + reach_m
                 mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
-                add(mud, walk, method, stride, plates_m=plates_m)
+                add(mud, walk, method, stride, plates_m=plates_m, trial=walk["trial"])
     for group, mud, _ in plan.soft_walks:
         for walk in walks_of(plan, entries, group):
             for method, strides in walk["strides"].items():
@@ -178,7 +178,7 @@ def _soft_depths(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strid
     return [
         {
             "depth_cm": 100.0 * depth_m,
-            "k_s": {method: gather_rows(k_s) for method, k_s in _k_s_of(own).groupby("method", sort=False)},
+            "k_s": {method: gather_coefficient(k_s) for method, k_s in _k_s_of(own).groupby("method", sort=False)},
             "truth": average_truth(own, median).get("k_s"),
             "thrust_n": _thrust_n(walks_of(plan, entries, name)),  # of both flippers
         }

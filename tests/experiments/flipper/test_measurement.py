@@ -25,6 +25,7 @@ from experiments.trials.coefficient_page import COMPARISON
 from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.stride_profile import profile_from
+from firmware_host.configuration.configuration import Configuration
 from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
 
@@ -80,11 +81,19 @@ def report(*arguments: Any, **options: Any) -> Report:
 # the required configuration
 
 
-def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
-    with pytest.raises(BenchError, match=r'gait\.protocol = "single_flipper" and estimation\.fixed_base = true'):
-        require_bench("right", simulated_configuration())
-    with pytest.raises(BenchError, match=r"set estimation\.fixed_base = true in"):
-        require_bench("right", simulated_configuration('[gait]\nprotocol = "single_flipper"\n'))
+@pytest.mark.parametrize(
+    ("configuration", "flipper", "named"),
+    [
+        (simulated_configuration(), "right", r'gait\.protocol = "single_flipper" and estimation\.fixed_base = true'),
+        (simulated_configuration('[gait]\nprotocol = "single_flipper"\n'), "right", r"set estimation\.fixed_base"),
+        (bench_configuration(Rig(("right",))), "left", "--flipper right"),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_refused_with_what_to_set(
+    configuration: Configuration, flipper: str, named: str
+) -> None:
+    with pytest.raises(BenchError, match=named):
+        require_bench(flipper, configuration)
 
 
 # invalid trials
@@ -128,25 +137,20 @@ def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> 
 # the report
 
 
-def test_the_coefficients_are_those_of_the_load_cell() -> None:
+def test_the_coefficients_are_those_of_the_load_cell_and_the_papers_method_is_next_to_them() -> None:
     """They agree within the 3.2 % of the torque constant, and in k_e within the default method's own bias."""
-    (mud,) = report()["muds"]
+    (mud,), (entry,) = report()["muds"], measured()[0].values()
     for name, fraction in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
         assert mud[name].value == pytest.approx(mud["truth"][name], rel=fraction)
     assert mud["remarks"] == []
-
-
-def test_the_daemons_strides_count_and_the_papers_method_is_next_to_them() -> None:
-    (entry,) = measured()[0].values()
     assert list(entry["strides"]) == [DEFAULT, PAPER]
-    assert report()["muds"][0]["k_s"].trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
+    assert mud["k_s"].trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]  # the daemon's strides count
     assert {row["method"] for row in report()["errors"]} == {DEFAULT, PAPER}
 
 
 def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
-    truth = {MUD: {"k_p": 2e6}}
-    found = report(truth=truth)
-    assert found["muds"][0]["truth"] == truth[MUD]
+    found = report(truth={MUD: {"k_p": 2e6}})
+    assert found["muds"][0]["truth"] == {"k_p": 2e6}
     assert {row["coefficient"] for row in found["errors"]} == {"k_p"}
 
 
@@ -162,41 +166,41 @@ def test_the_law_follows_the_force_in_steady_stance() -> None:
     assert misfit_n and largest_n and misfit_n < 0.1 * largest_n
 
 
-def entries_of(**values: list[float]) -> dict[str, Entry]:
+FORCES = {"insertion_force_n": 2.0, "stance_force_n": 8.0, "extraction_force_n": -2.0}
+
+
+def entries_of(values: dict[str, list[float]]) -> dict[str, Entry]:
     """Return entries of trials with these values of k_p by mud."""
-    profile = next(iter(measured()[0].values()))["course"]
+    rest = {"truths": {}, "course": next(iter(measured()[0].values()))["course"], "remarks": []}
     return {
-        f"{mud}/{number}": {
-            "mud": mud,
-            "trial": number,
-            "strides": {DEFAULT: [make_stride(k_p=make_estimate(value), **FORCES)]},
-            "truths": {},
-            "course": profile,
-            "remarks": [],
-        }
-        for mud, reported in ((name.removeprefix("w").replace("_", "."), reported) for name, reported in values.items())
+        f"{mud}/{number}": rest
+        | {"mud": mud, "trial": number, "strides": {DEFAULT: [make_stride(k_p=make_estimate(value), **FORCES)]}}
+        for mud, reported in values.items()
         for number, value in enumerate(reported, 1)
     }
 
 
-FORCES = {"insertion_force_n": 2.0, "stance_force_n": 8.0, "extraction_force_n": -2.0}
-
-
-def test_the_report_says_whether_coefficients_fall_with_water() -> None:
-    falling = report(entries_of(w47_6=[2e6, 2.2e6], w51_2=[1e6]), ("51.2", "47.6"))
-    assert falling["falls_with_water"]["k_p"] is True
-    rising = report(entries_of(w47_6=[1e6], w51_2=[2e6]), ("51.2", "47.6"))
-    assert rising["falls_with_water"]["k_p"] is False
-    assert report(entries_of(a=[1e6], b=[2e6]), ("a", "b"))["falls_with_water"]["k_p"] is None
+@pytest.mark.parametrize(
+    ("values", "falls"),
+    [
+        ({"47.6": [2e6, 2.2e6], "51.2": [1e6]}, True),
+        ({"47.6": [1e6], "51.2": [2e6]}, False),
+        ({"a": [1e6], "b": [2e6]}, None),
+    ],
+)
+def test_the_report_says_whether_coefficients_fall_with_water(
+    values: dict[str, list[float]], falls: bool | None
+) -> None:
+    assert report(entries_of(values), tuple(values)[::-1])["falls_with_water"]["k_p"] is falls
 
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
-    by_mud = trials_by_mud(("51.2", "30"), entries_of(w47_6=[2e6], w51_2=[1e6]))
+    by_mud = trials_by_mud(("51.2", "30"), entries_of({"47.6": [2e6], "51.2": [1e6]}))
     assert list(by_mud) == ["51.2", "47.6"]
 
 
 def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
-    entries = entries_of(w47_6=[2e6])
+    entries = entries_of({"47.6": [2e6]})
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
     found = report(entries, ("47.6",))
     assert found["later_strokes"]["k_p"] == pytest.approx([0.8])
@@ -204,7 +208,7 @@ def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
 
 
 def test_without_a_load_cell_there_are_no_errors() -> None:
-    entries = entries_of(w47_6=[2e6])
+    entries = entries_of({"47.6": [2e6]})
     result = reported(entries, ("47.6",))
     misfit_n = result.summary["misfit_n"]["47.6"]["insertion"]
     assert (
@@ -234,8 +238,3 @@ def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
     (truth,) = entry["truths"].values()
     assert all(stride[name]["valid"] for name in ("k_p", "k_s", "k_e"))
     assert stride["k_s"]["value"] == pytest.approx(truth["k_s"], rel=0.15)
-
-
-def test_a_flipper_that_the_rig_lacks_is_refused() -> None:
-    with pytest.raises(BenchError, match="--flipper right"):
-        require_bench("left", bench_configuration(Rig(("right",))))

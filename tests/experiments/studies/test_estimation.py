@@ -48,25 +48,21 @@ def synthetic(setup: str, muds: Any, **row: Any) -> dict[str, Any]:
 def test_there_is_a_trial_for_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() -> None:
     trials = SyntheticTrials(synthetic)
     study(trials, seeds=3)
-    walks = [row for row in trials.rows if len(row["muds"]) > 1]
+    walks, rows = [row for row in trials.rows if len(row["muds"]) > 1], trials.rows[3:]
     assert trials.rows[:3] == walks  # the longest first
     assert walks[0]["muds"] == walks[1]["muds"][::-1] and {row["strides"] for row in walks} == {24}
-    alone = [(row["setup"], row["muds"][0][0], row["strides"], row["seed"]) for row in trials.rows[3:]]
-    assert len({*alone}) == len(alone) == 3 * (5 + 3 + 3)
-    assert {row[::2] for row in alone} == {("single", 2), ("walking", 8), ("measuring", 8)}
+    assert len({(row["setup"], row["muds"][0][0], row["seed"]) for row in rows}) == len(rows) == 3 * (5 + 3 + 3)
+    assert {(row["setup"], row["strides"]) for row in rows} == {("single", 2), ("walking", 8), ("measuring", 8)}
     assert all(row["layers"] == [*LAYERS] for row in trials.rows)
 
 
 def test_muds_setup_and_layers_can_be_chosen() -> None:
     trials = SyntheticTrials(synthetic)
-    summary = study(trials, setup="single", mud=(parse_water("48.5"), parse_water("50")), seeds=1, layers=()).summary
-    assert [row["muds"][0][0] for row in trials.rows] == ["48.5", "50"] and not any(
-        row["layers"] for row in trials.rows
-    )
-    assert (summary["settings"]["repeats"], summary["settings"]["torque_error"]) == (False, 0.0)
-    trials = SyntheticTrials(synthetic)
-    study(trials, setup="walking", strength=(1500.0,), seeds=1)
-    assert [row["muds"] for row in trials.rows] == [[["1500 Pa", 1500.0]]]
+    settings = study(trials, setup="single", mud=(parse_water("48.5"),), seeds=1, layers=()).summary["settings"]
+    study(trials, setup="walking", strength=(1500.0,), seeds=1, layers=())
+    assert [row["muds"][0][0] for row in trials.rows] == ["48.5", "1500 Pa"]
+    assert not any(row["layers"] for row in trials.rows)
+    assert (settings["repeats"], settings["torque_error"]) == (False, 0.0)
 
 
 def test_wrong_muds_and_layers_are_refused() -> None:

@@ -54,17 +54,30 @@ class AskedRobot(StillRobot):
         return {"mode": self.mode, "now_s": self.now_s, "faults": faults} if method == "status" else "accepted"
 
 
+ALL = [trial.key for trial in TRIALS]
+FAULT = BenchError("the walk ended early: a drive is silent.")
+MOVED = InvalidTrialError("the base moved by 113 mm", {"remarks": []})
+DOUBTFUL = {"remarks": ["the base moved by 5.0 mm"]}
+FIRST = "47.6 %, trial 1 of 3"
+
+
 class Session:
     """Owns a bench of scripted parts; its measurements give the listed outcomes."""
 
-    def __init__(self, folder: Path, operator: ScriptedOperator | None = None, answers: Sequence[str] = ()) -> None:
-        """`answers` are those of the operator who prepares the mud."""
-        self.robot, self.operator, self.answers = AskedRobot(), operator or ScriptedOperator(), list(answers)
+    def __init__(
+        self,
+        folder: Path,
+        outcomes: Sequence[Entry | BaseException] = (),
+        answers: Sequence[str] = (),
+        prepared: Sequence[str] = (),
+    ) -> None:
+        """`prepared` are the answers of the operator who prepares the mud."""
+        self.robot, self.operator = AskedRobot(), ScriptedOperator(*answers)
         self.notebook = Notebook(folder, PLAN)
         self.bench = Bench(self.robot, self.operator, self.notebook, self.prepare)
+        self.outcomes, self.answers = list(outcomes), list(prepared)
         self.prepared: list[str] = []
         self.measured: list[str] = []
-        self.outcomes: list[Entry | BaseException] = []
         self.shown: list[tuple[int, int]] = []
 
     def prepare(self, trial: PlannedTrial) -> str:
@@ -83,9 +96,6 @@ class Session:
         return self
 
 
-ALL = [trial.key for trial in TRIALS]
-
-
 def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
     session = Session(tmp_path).conduct()
     assert session.prepared == session.measured == list(session.notebook.entries) == ALL
@@ -94,37 +104,65 @@ def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
 
 
 def test_an_interrupted_experiment_continues(tmp_path: Path) -> None:
-    first = Session(tmp_path)
-    first.outcomes = [{"remarks": []}, KeyboardInterrupt()]
     with pytest.raises(KeyboardInterrupt):
-        first.conduct()
+        Session(tmp_path, [{"remarks": []}, KeyboardInterrupt()]).conduct()
     second = Session(tmp_path).conduct()
     assert second.prepared == second.measured == ALL[1:]
 
 
+@pytest.mark.parametrize(
+    ("outcomes", "answers", "asked", "measured", "kept"),
+    [
+        ([FAULT], [], f"{FIRST} went wrong: the walk ended early: a drive is silent.", [ALL[0], *ALL], ALL),
+        ([MOVED], [GO_ON], f"{FIRST} went wrong: the base moved by 113 mm.", [ALL[0], *ALL], ALL),
+        ([MOVED], [KEEP], f"{FIRST} went wrong: the base moved by 113 mm.", ALL, ALL),
+        ([DOUBTFUL], [GO_ON], "Is this trial to count?", ALL, ALL),
+        ([DOUBTFUL], [SKIP], "Is this trial to count?", ALL, ALL[1:]),
+        ([DOUBTFUL], [REDO], "Is this trial to count?", [ALL[0], *ALL], ALL),
+        ([MOVED] * 3, [GO_ON, GO_ON, REDO], f"{FIRST} went wrong 3 times", [ALL[0]] * 3 + ALL, ALL),
+        ([MOVED] * 3, [GO_ON, GO_ON, SKIP], f"{FIRST} went wrong 3 times", [ALL[0]] * 3 + ALL[1:], ALL[1:]),
+    ],
+)
+def test_the_operator_decides_on_invalid_and_doubtful_trials(
+    outcomes: list[Entry], answers: list[str], asked: str, measured: list[str], kept: list[str], tmp_path: Path
+) -> None:
+    session = Session(tmp_path, outcomes, answers).conduct()
+    assert session.operator.asked[-1].startswith(asked)
+    assert session.operator.reported == ([f"{FIRST}: the base moved by 5.0 mm"] if outcomes == [DOUBTFUL] else [])
+    assert session.prepared == session.measured == measured
+    counted = counted_entries(session.notebook)
+    assert list(counted) == kept
+    if answers == [KEEP]:
+        assert counted[ALL[0]]["remarks"] == ["the base moved by 113 mm"]
+
+
+def test_a_third_failure_ends_the_experiment_unless_the_operator_repeats_it(tmp_path: Path) -> None:
+    session = Session(tmp_path, [{"remarks": []}, *[MOVED] * 3])
+    with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times"):
+        session.conduct()
+    assert list(session.notebook.entries) == ALL[:1]
+
+
 def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, answers=(GO_ON, SKIP)).conduct()
+    session = Session(tmp_path, prepared=(GO_ON, SKIP)).conduct()
     assert list(counted_entries(session.notebook)) == [ALL[0], ALL[2]]
     again = Session(tmp_path).conduct()
     assert again.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
 
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, answers=(GO_ON, REDO)).conduct()
+    session = Session(tmp_path, prepared=(GO_ON, REDO)).conduct()
     assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
     assert session.notebook.entries[ALL[0]]["count"] == 2
 
 
-def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
-    session = Session(tmp_path)
-    session.outcomes = [BenchError("the walk ended early: a drive is silent.")]
-    session.conduct()
-    assert session.operator.asked == ["47.6 %, trial 1 of 3 went wrong: the walk ended early: a drive is silent."]
-    assert session.prepared == session.measured == [ALL[0], *ALL]
+def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="nothing was measured"):
+        counted_entries(Session(tmp_path, prepared=(SKIP, SKIP, SKIP)).conduct().notebook)
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
-def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path, answer: str) -> None:
+def test_the_operator_decides_on_a_fault_before_levelling_the_mud(answer: str) -> None:
     robot, operator = AskedRobot(), ScriptedOperator(answer)
     robot.blocked = True
     prepare = partial(prepare_by_hand, robot, operator, lambda trial: "Level it", TRIALS[0])
@@ -137,50 +175,10 @@ def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
 
-@pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
-def test_an_invalid_trial_is_repeated_by_enter_and_kept_by_a_key(
-    tmp_path: Path, answer: str, measured: list[str]
-) -> None:
-    session = Session(tmp_path, ScriptedOperator(answer))
-    session.outcomes = [InvalidTrialError("the base moved by 113 mm", {"remarks": []})]
-    assert session.conduct().measured == measured
-    kept = ["the base moved by 113 mm"] if answer == KEEP else []
-    assert session.notebook.entries[ALL[0]]["remarks"] == kept
-
-
 def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
-    session = Session(tmp_path)
+    session = Session(tmp_path, [MOVED])
     session.robot.mode = "walking"
-    session.outcomes = [InvalidTrialError("the pose is lost")]
-    session.conduct()
-    assert session.robot.called[:2] == ["status", "stop"]
-
-
-@pytest.mark.parametrize(("answer", "kept"), [(REDO, ALL), (SKIP, ALL[1:])])
-def test_the_operator_may_continue_after_the_third_attempt(tmp_path: Path, answer: str, kept: list[str]) -> None:
-    session = Session(tmp_path, ScriptedOperator(GO_ON, GO_ON, answer))
-    session.outcomes = [BenchError("it was stopped") for _ in range(3)]
-    session.conduct()
-    assert "went wrong 3 times; the last time: it was stopped." in session.operator.asked[-1]
-    assert list(counted_entries(session.notebook)) == kept
-
-
-def test_a_third_failure_ends_the_experiment_unless_the_operator_repeats_it(tmp_path: Path) -> None:
-    session = Session(tmp_path)
-    session.outcomes = [{"remarks": []}, *(InvalidTrialError("no mud") for _ in range(3))]
-    with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times; the last time: no mud"):
-        session.conduct()
-    assert list(session.notebook.entries) == ALL[:1]
-
-
-@pytest.mark.parametrize(("answer", "kept"), [(GO_ON, ALL), (SKIP, ALL[1:]), (REDO, ALL)])
-def test_a_doubtful_trial_counts_as_the_operator_decides(tmp_path: Path, answer: str, kept: list[str]) -> None:
-    session = Session(tmp_path, ScriptedOperator(answer))
-    session.outcomes = [{"remarks": ["the base moved by 5.0 mm"]}]
-    session.conduct()
-    assert session.operator.reported == ["47.6 %, trial 1 of 3: the base moved by 5.0 mm"]
-    assert list(counted_entries(session.notebook)) == kept
-    assert len(session.measured) == (4 if answer == REDO else 3)
+    assert session.conduct().robot.called[:2] == ["status", "stop"]
 
 
 def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -> None:
@@ -190,11 +188,6 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -
     assert leave(session.bench.robot, session.bench.operator, tmp_path) == [tmp_path / "old.mcap"]
     assert session.operator.reported == ["the daemon does not answer"]
     assert session.robot.closed
-
-
-def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
-    with pytest.raises(BenchError, match="nothing was measured"):
-        counted_entries(Session(tmp_path, answers=(SKIP, SKIP, SKIP)).conduct().notebook)
 
 
 class DaemonsRobot(AskedRobot):
@@ -224,14 +217,11 @@ def test_another_configuration_or_daemon_of_a_real_robot_is_refused_and_the_robo
     robot, notebook = opened()
     assert isinstance(notebook, Notebook) and not robot.closed
     notebook.write("47.6/1", {})
-    for changed, key in (
+    stiffness = "sweep_stiffness_nm_rad"
+    for (robot, refused), key in (
         (opened("0.3"), "daemon.version = 0.2"),
-        (
-            opened(sections="[gains]\nsweep_stiffness_nm_rad = 9.0"),
-            "configuration.gains.sweep_stiffness_nm_rad = (none)",
-        ),
+        (opened(sections=f"[gains]\n{stiffness} = 9.0"), f"configuration.gains.{stiffness} = (none)"),
     ):
-        robot, refused = changed
         assert isinstance(refused, str) and key in refused and robot.closed
     robot, notebook = opened(sections="# a comment\n")
     assert isinstance(notebook, Notebook) and list(notebook.entries) == ["47.6/1"]

@@ -1,7 +1,6 @@
 """In synthetic walks over borders the transitions and the strides until the estimate has followed are counted."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -64,20 +63,18 @@ def mud_estimate(k_p: float | None, depth_m: float = DEPTH_M) -> MudEstimate:
     return MudEstimate(left=one, right=one)
 
 
-@dataclass
-class Walk:
-    """The mud of each stride, and the estimate of k_p after it, the same for both flippers."""
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Row]]:
+    """Provide the transitions of a walk by the mud of each stride and both flippers' estimate of k_p after it."""
 
-    muds: Sequence[str]
-    estimates: Sequence[float | None]
-    depth_m: float = DEPTH_M
-
-    def transitions(self, monkeypatch: pytest.MonkeyPatch) -> list[Row]:
-        truths = [stride(flipper, i, mud) for i, mud in enumerate(self.muds) for flipper in FLIPPERS]
-        replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, self.depth_m)) for i, k_p in enumerate(self.estimates)]
+    def transitions(muds: Sequence[str], estimates: Sequence[float | None], depth_m: float = DEPTH_M) -> list[Row]:
+        truths = [stride(flipper, i, mud) for i, mud in enumerate(muds) for flipper in FLIPPERS]
+        replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, depth_m)) for i, k_p in enumerate(estimates)]
         monkeypatch.setattr(experiments.trials.transitions, "replay_trial", lambda trial, parameters: replayed)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
         return transitions_of(trial, {(truth.flipper, truth.index): {"k_p": K_P[truth.clay.name]} for truth in truths})
+
+    return transitions
 
 
 @pytest.mark.parametrize(
@@ -88,32 +85,24 @@ class Walk:
         ((1e6, 1e6, 1e6, None, 2e6), 3),
         ((1e6, 1e6, 1e6, 1e6, 1e6), None),
         ((1e6, 1e6, 2e6, 1e6, 1e6), 1),  # later estimates do not matter
+        *(((1e6, 1e6, *[factor * 2e6] * 3), 1) for factor in (0.801, 1.199)),  # within a fifth of the truth
+        *(((1e6, 1e6, *[factor * 2e6] * 3), None) for factor in (0.799, 1.201)),
     ],
 )
-def test_strides_are_counted_from_the_first_in_the_next_mud(
-    estimates: Sequence[float | None], strides: int | None, monkeypatch: pytest.MonkeyPatch
+def test_strides_are_counted_from_the_first_in_the_next_mud_until_the_estimate_has_followed(
+    estimates: Sequence[float | None], strides: int | None, found: Callable[..., list[Row]]
 ) -> None:
-    walk = Walk(("soft", "soft", "firm", "firm", "firm"), estimates)
-    assert walk.transitions(monkeypatch) == [transition(strides), transition(strides, "right")]
+    transitions = found(("soft", "soft", "firm", "firm", "firm"), estimates)
+    assert transitions == [transition(strides), transition(strides, "right")]
 
 
-@pytest.mark.parametrize(("off", "strides"), [(0.199, 1), (0.201, None)])
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_an_estimate_within_a_fifth_of_the_truth_has_followed(
-    sign: float, off: float, strides: int | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    walk = Walk(("soft", "firm"), (1e6, (1.0 + sign * off) * 2e6))
-    assert [each["strides"] for each in walk.transitions(monkeypatch)] == [strides, strides]
-
-
-def test_the_estimate_is_evaluated_at_the_depth_of_the_stride(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_estimate_is_evaluated_at_the_depth_of_the_stride(found: Callable[..., list[Row]]) -> None:
     """k ∝ 1/z here: 4 million at 1.5 cm are 2 million at 3 cm."""
-    walk = Walk(("soft", "firm"), (1e6, 4e6), depth_m=DEPTH_M / 2.0)
-    assert [each["strides"] for each in walk.transitions(monkeypatch)] == [1, 1]
+    assert [each["strides"] for each in found(("soft", "firm"), (1e6, 4e6), DEPTH_M / 2.0)] == [1, 1]
 
 
-def test_the_next_border_ends_a_transition(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_next_border_ends_a_transition(found: Callable[..., list[Row]]) -> None:
     """An estimate that becomes right again only because the next mud begins has not followed."""
-    walk = Walk(("soft", "firm", "firm", "soft", "soft"), (1e6, 1e6, 1e6, 1e6, 1e6))
-    left = [each for each in walk.transitions(monkeypatch) if each["flipper"] == "left"]
+    walked = found(("soft", "firm", "firm", "soft", "soft"), [1e6] * 5)
+    left = [each for each in walked if each["flipper"] == "left"]
     assert left == [transition(None), transition(1, before="firm", after="soft")]

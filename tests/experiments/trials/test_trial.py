@@ -11,6 +11,7 @@ from control.records import FLIPPERS
 from estimation.estimation_parameters import EstimationParameters
 from estimation.mud import MudEstimator
 from experiments.trials.trial import (
+    CONSTANTS,
     WALKING,
     Sample,
     Setup,
@@ -69,10 +70,9 @@ def test_messages_are_at_most_two_milliseconds_old() -> None:
 
 
 def test_there_is_a_truth_of_each_flippers_every_stride() -> None:
-    assert [(truth.flipper, truth.index) for truth in trial().truths] == [(flipper, 0) for flipper in FLIPPERS]
-    for truth in trial().truths:
-        assert truth.clay.name == "47.6"
-        assert truth.insertion.deepest_m > 0.02
+    truths = [(truth.flipper, truth.index, truth.clay.name) for truth in trial().truths]
+    assert truths == [(flipper, 0, "47.6") for flipper in FLIPPERS]
+    assert all(truth.insertion.deepest_m > 0.02 for truth in trial().truths)
 
 
 def test_a_fixed_base_stays_where_it_is_and_a_free_one_does_not() -> None:
@@ -88,14 +88,12 @@ def test_a_fixed_base_stays_where_it_is_and_a_free_one_does_not() -> None:
 
 def test_torque_constants_are_known_as_wrongly_as_asked() -> None:
     exactly = configuration_of(WALKING).flipper_drives
-    assert len({constant for drive in trial().drives for constant in drive[1:3]}) == 4
     assert trial_of_new_rows().drives == exactly
+    assert len({getattr(drive, name) for drive in trial().drives for name in CONSTANTS}) == 4
     for known, true in zip(trial().drives, exactly, strict=True):
-        assert known.sweep_constant_nm_a != true.sweep_constant_nm_a
-        assert known.adduction_constant_nm_a == pytest.approx(true.adduction_constant_nm_a, rel=0.15)
-        assert known._replace(sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0) == true._replace(
-            sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0
-        )
+        wrong = {name: getattr(known, name) for name in CONSTANTS}
+        assert known == true._replace(**wrong)
+        assert all(constant == pytest.approx(getattr(true, name), rel=0.15) for name, constant in wrong.items())
 
 
 # estimates of a trial
