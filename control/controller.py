@@ -50,6 +50,11 @@ class WalkOrder(NamedTuple):
     depth_m: float  # of every stride; of the first one if adaptive
     adaptive: bool = True
     strides: int = 0  # 0: until a stop is requested
+    depths_m: tuple[float, ...] = ()  # of the strides in turn, which show how a mud changes with depth; or none
+
+    def depth_of(self, stride: int) -> float:
+        """Return the depth of a stride of a walk that does not adapt."""
+        return self.depths_m[stride % len(self.depths_m)] if self.depths_m else self.depth_m
 
 
 def measured_angles(states: DriveStates) -> JointAngles:

@@ -289,7 +289,7 @@ class Loop:
     def change_depth(self, depth_m: float, now_s: float, by: str) -> None:
         """Fix the depth of the present walk, also one that adapted; a stride that has begun keeps its own."""
         self.events.report(now_s, f"depth {depth_m:.4f} m by {by}")
-        self.controller.order = self.controller.order._replace(depth_m=depth_m, adaptive=False)
+        self.controller.order = self.controller.order._replace(depth_m=depth_m, adaptive=False, depths_m=())
         self.controller.gait.next_depth_m = depth_m
 
     def move(self, angles_rad: Mapping[str, float], now_s: float, by: str) -> None:
@@ -305,8 +305,9 @@ class Loop:
         if forced and not set(forced.split(",")) <= set(OVERRULED_BY_FORCE):
             return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
         deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
-        if order is not None and not 0.0 < order.depth_m <= deepest_m:
-            return f"depth {100.0 * order.depth_m:g} cm: out of the flippers' reach over the sweep"
+        for depth_m in () if order is None else order.depths_m or (order.depth_m,):
+            if not 0.0 < depth_m <= deepest_m:
+                return f"depth {100.0 * depth_m:g} cm: out of the flippers' reach over the sweep"
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         refused = refusal(self.mode, request, health)
         return refused.text if refused else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -71,12 +71,12 @@ class Client:
         """Energise the joints; `force` names the kind of fault to overrule, such as uncalibrated."""
         self._move("arm", force=force)
 
-    def walk(self, strides: int = 0, depth_m: float | None = None, **trial: object) -> None:
-        """Walk so many strides (0: without end), at a fixed depth or at depths that adapt to the mud.
+    def walk(self, strides: int = 0, depth_m: float | Sequence[float] | None = None, **trial: object) -> None:
+        """Walk so many strides (0: without end), at a fixed depth, at several in turn, or at depths that adapt.
 
         `trial` describes the walk in its log, a new one: mud, water, trial, operator, tags and note.
         """
-        depth = {} if depth_m is None else {"depth_m": depth_m}
+        depth = {"depths_m": list(depth_m)} if isinstance(depth_m, Sequence) else {"depth_m": depth_m}
         self._move("walk", strides=strides, **depth, **_texts(trial))
 
     def trial(self, **defaults: object) -> Report:

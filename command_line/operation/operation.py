@@ -84,9 +84,15 @@ def walk(
     socket: Socket,
     json: Json = False,
     depth: Annotated[  # the daemon knows the robot's limit
-        float | None,
-        Option("insertion depth of every stride", unit="cm", low=LEAST_DEPTH_CM, high=20.0, alternative="depth"),
-    ] = None,
+        tuple[float, ...],
+        Option(
+            "insertion depth of every stride, or of the strides in turn",
+            unit="cm",
+            low=LEAST_DEPTH_CM,
+            high=20.0,
+            alternative="depth",
+        ),
+    ] = (),
     adaptive: Annotated[
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
     ] = False,
@@ -102,7 +108,9 @@ def walk(
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> int:
-    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed.
+    """Walk at `depth`, or adapt to the mud without one; `adaptive` is there to be typed.
+
+    Depths in turn, such as `--depth 2 --depth 3.5 --depth 5`, measure how the coefficients change with depth.
 
     A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
     """
@@ -110,8 +118,9 @@ def walk(
     described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
     described["water"] = "" if water is None else f"{water:g}"
     params |= {key: value for key, value in described.items() if value}
-    if depth is not None:
-        params["depth_m"] = depth / 100.0
+    if depth:
+        depths_m = [each / 100.0 for each in depth]
+        params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}
     if attended:
         with connect(socket) as client:
             return attend(client, json, params)

@@ -166,19 +166,27 @@ class OperatorCalls:
         return map_report(self._loop.learning.estimator.map.rows(after_m, PIECES_PER_ANSWER))
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
-        depth_m = params["depth_m"]
+        depth_m, in_turn_m = params["depth_m"], params["depths_m"] or ()
         trial = self._trials.planned(params)
-        self._require_depth(depth_m)
-        adaptive = depth_m is None
-        first_m = self._loop.configuration.adaptation.initial_depth_m if adaptive else float(depth_m)
-        answer = self._request(caller, Request.WALK, WalkOrder(first_m, adaptive, params["strides"]))
+        if in_turn_m and depth_m is not None:
+            raise RefusedError("give either depth_m or depths_m")
+        depths_m = in_turn_m or (() if depth_m is None else (depth_m,))
+        for each_m in depths_m:
+            self._require_depth(each_m)
+        order = WalkOrder(
+            depth_m=float(depths_m[0]) if depths_m else self._loop.configuration.adaptation.initial_depth_m,
+            adaptive=not depths_m,
+            strides=params["strides"],
+            depths_m=tuple(map(float, in_turn_m)),
+        )
+        answer = self._request(caller, Request.WALK, order)
         self._trials.begin(trial, caller)
         return answer
 
-    def _require_depth(self, depth_m: float | None) -> None:
+    def _require_depth(self, depth_m: float) -> None:
         """Raise RefusedError for a depth beyond the configured ones."""
         deepest_m = self._loop.configuration.adaptation.max_depth_m
-        if depth_m is not None and not SHALLOWEST_M <= depth_m <= deepest_m:
+        if not SHALLOWEST_M <= depth_m <= deepest_m:
             raise RefusedError(
                 f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
                 f" {100.0 * deepest_m:g} cm, which is adaptation.max_depth_m in the configuration"

@@ -36,6 +36,7 @@ class Level(IntEnum):
 
 class Type(StrEnum):
     NUMBER = "number"
+    NUMBERS = "array of numbers"
     INTEGER = "whole number"
     FLAG = "true or false"
     TEXT = "text"
@@ -43,6 +44,7 @@ class Type(StrEnum):
 
 REQUIREMENTS = {
     Type.NUMBER: "a number",
+    Type.NUMBERS: "an array of 1 to {longest} numbers",
     Type.INTEGER: "a whole number",
     Type.FLAG: "true or false",
     Type.TEXT: "at most {longest} printable characters",
@@ -59,7 +61,7 @@ class Parameter(NamedTuple):
     default: bool | int | float | str | None = None
     required: bool = False
     null_is_default: bool = False  # else an explicit null is refused
-    longest: int = LONGEST_NAME  # characters of a text
+    longest: int = LONGEST_NAME  # characters of a text, numbers of an array
 
     @property
     def bounds(self) -> str:
@@ -87,15 +89,21 @@ class Parameter(NamedTuple):
         match self.type:
             case Type.FLAG:
                 return isinstance(value, bool)
+            case Type.NUMBERS:
+                return isinstance(value, list) and 0 < len(value) <= self.longest and all(map(_is_number, value))
             case Type.TEXT:
                 return isinstance(value, str) and len(value) <= self.longest and value.isprintable()
             case Type.INTEGER:
                 fits = isinstance(value, int)
             case Type.NUMBER:
-                fits = isinstance(value, int | float) and isfinite(value)
+                fits = _is_number(value)
         if not fits or isinstance(value, bool):
             return False
         return self.range is None or self.range.minimum <= value <= self.range.maximum
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 class SocketMethod(NamedTuple):
@@ -148,6 +156,9 @@ DEPTH = Parameter(
     "m",
     bounds_note="at least 0.005, at most adaptation.max_depth_m",
     null_is_default=True,
+)
+DEPTHS = DEPTH._replace(
+    name="depths_m", type=Type.NUMBERS, meaning="fixed depths of the strides in turn, in place of depth_m"
 )
 FAILURE = (
     Parameter("component", Type.TEXT, 'what fails; "all" with kind "ok"', required=True),
@@ -274,7 +285,7 @@ METHODS: dict[str, SocketMethod] = {
     "walk": SocketMethod(
         Level.DRIVE,
         "Walk, with a depth that adapts to the mud or is fixed. A described walk is a trial: it begins a new log.",
-        (DEPTH, STRIDES, *LEASE, *TRIAL),
+        (DEPTH, DEPTHS, STRIDES, *LEASE, *TRIAL),
     ),
     "depth": SocketMethod(
         Level.DRIVE,

@@ -384,3 +384,18 @@ def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(a
     assert loop.stride_depth_m == 0.02 and armed.events.texts.count(f"depth 0.0200 m by {ANNA}") == 1
     armed.steps.run_until(lambda: loop.target.stride == 5, 20.0)
     assert loop.stride_depth_m == 0.02
+
+
+def test_a_walk_takes_several_depths_in_turn_until_one_is_fixed(armed: Robot) -> None:
+    loop, walked_m = armed.steps.loop, []
+    for depths_m, depth_m in (([0.02, 0.2], None), ([0.02], 0.02), ([], None), ([0.02, "deep"], None)):
+        with pytest.raises(RefusedError):
+            armed.ask("walk", depths_m=depths_m, depth_m=depth_m)
+    armed.ask("walk", depths_m=[0.02, 0.03, 0.04])
+    for stride in range(5):
+        armed.steps.run_until(lambda stride=stride: loop.target.stride == stride, 20.0)  # type: ignore[misc]
+        walked_m.append(loop.stride_depth_m)
+    assert walked_m == [0.02, 0.03, 0.04, 0.02, 0.03]
+    armed.ask("depth", depth_m=0.025)
+    armed.steps.run_until(lambda: loop.target.stride == 6, 20.0)
+    assert loop.stride_depth_m == 0.025
