@@ -26,13 +26,9 @@ class Column:
     values: NDArray[Any]
     words: Mapping[int, str]  # of an enumeration, by number; empty for other columns
 
-    def coded(self, numbers: NDArray[Any] | None = None) -> tuple[NDArray[np.int32], list[str]]:
-        """Return the number of each cell's word, and the words. A number that this version does not know is shown.
-
-        `numbers` are those of the whole table in ascending order, if these cells are only some of them.
-        """
-        numbers = np.unique(self.values) if numbers is None else numbers
-        codes = np.searchsorted(numbers, self.values)
+    def coded(self) -> tuple[NDArray[np.int32], list[str]]:
+        """Return the number of each cell's word, and the words. A number that this version does not know is shown."""
+        numbers, codes = np.unique(self.values, return_inverse=True)
         return codes.astype(np.int32), [self.words.get(int(number), str(number)) for number in numbers]
 
 

@@ -25,7 +25,7 @@ from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from logs.files.log_error import LogError, Watch, unwatched
-from logs.files.log_reader import AnyLog, TickPass
+from logs.files.log_reader import AnyLog, watched_blocks
 from logs.files.log_summary import begin_s, segments_before
 from logs.files.scanned_log import scan_logs
 from logs.files.tick_array import Ticks
@@ -93,7 +93,9 @@ def replay_log(
 ) -> Replay:
     """Replay with the configuration that the log carries, unless another one is given. Raises LogError."""
     running = RunningReplay(path, log, configuration, method)
-    return running.finish(TickPass(log, watch, "ticks replayed").feed(running.add))
+    for ticks in watched_blocks(log, watch, "ticks replayed"):
+        running.add(ticks)
+    return running.finish()
 
 
 class RunningReplay:
@@ -129,14 +131,14 @@ class RunningReplay:
                 estimator.reset()
             self._mode_before = mode
 
-    def finish(self, complete: bool) -> Replay:
+    def finish(self) -> Replay:
         log, strides = self._log, self._strides
         chosen_m = {(FLIPPERS[bool(row["flipper"])], row["t_start_s"]): row["chosen_depth_m"] for row in log.strides}
         return Replay(
             strides,
             self._flippers,
             self._estimator.map.rows(),
-            complete,
+            log.complete,
             segments_before(log),
             begin_s(log),
             fits=tuple(self._fits),

@@ -41,14 +41,13 @@ def export(
 
 def _write_csv(log: ScannedLog, path: Path | None) -> list[Path]:
     if path is None:
-        write_lab_csv(log, sys.stdout).raise_cut()
+        write_lab_csv(log, sys.stdout)
         return []
     try:
         with whole_file(path) as hidden, hidden.open("w", encoding="utf-8") as out, watched() as watch:
-            rows = write_lab_csv(log, out, watch)
+            write_lab_csv(log, out, watch)
     except OSError as problem:
         raise _not_written(path, problem) from None
-    rows.raise_cut()
     return [path]
 
 

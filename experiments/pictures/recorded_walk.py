@@ -19,7 +19,7 @@ from experiments.pictures.walk_trace import Rows, WalkTraces, drawn_rows
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
 from logs.files.log_error import LogError, Watch, unwatched
-from logs.files.log_reader import AnyLog, TickPass
+from logs.files.log_reader import AnyLog, watched_blocks
 from logs.files.log_summary import begin_s, log_summary, segments_before
 from logs.files.scanned_log import scan_logs
 from logs.lab.body_track import VERTICAL_AXIS
@@ -124,14 +124,13 @@ def read_walk(
 def numbered_walk(path: Path, log: AnyLog, number: int = 0, watch: Watch = unwatched) -> RecordedWalk:
     """Return a walk of a log; `path` is for messages. Raises LogError."""
     configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(log.rows, number)
-    complete = TickPass(log, watch, "ticks read").feed(traces.add)
+    for ticks in watched_blocks(log, watch, "ticks read"):
+        traces.add(ticks)
     _refuse_number(path, number, len(traces.walks))
-    return walk_of_trace(log, configuration, traces, number or len(traces.walks), complete)
+    return walk_of_trace(log, configuration, traces, number or len(traces.walks))
 
 
-def walk_of_trace(
-    log: AnyLog, configuration: Configuration, traces: WalkTraces, number: int, complete: bool
-) -> RecordedWalk:
+def walk_of_trace(log: AnyLog, configuration: Configuration, traces: WalkTraces, number: int) -> RecordedWalk:
     """Return walk `number` of a log from its trace. Strides and events belong to it up to the next walk."""
     summary, trace, later = log_summary(log), traces.walks[number - 1], traces.walks[number:]
     until_s = later[0].start_s if later else np.inf
@@ -146,7 +145,7 @@ def walk_of_trace(
         noticed_s=[event["stamp_s"] - trace.start_s for event in events if event["text"] == ANOTHER_MUD],
         walks=len(traces.walks),
         begun_s=trace.start_s - begin_s(log),
-        complete=complete,
+        complete=log.complete,
         cut=_cut_of(log, trace.first_row == 0, trace.end_row == log.rows),
         source=TraceSource(log, trace.rows, trace.start_s) if traces.bin_ticks else None,
     )

@@ -27,7 +27,7 @@ from experiments.reports.mud_names import mud_label, mud_name
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes
 from logs.files.log_error import LogError, Watch
-from logs.files.log_reader import TickPass
+from logs.files.log_reader import watched_blocks
 from logs.files.log_summary import trial_of
 from logs.files.scanned_log import ScannedLog, join_logs, scan_log
 from logs.lab.body_track import VERTICAL_AXIS
@@ -121,9 +121,11 @@ def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list
     """Return the estimates and the walks of a log. Raises LogError."""
     configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(log.rows)
     running = RunningReplay(path, log, configuration)
-    complete = TickPass(log, watch, "ticks replayed").feed(running.add, traces.add)
+    for ticks in watched_blocks(log, watch, "ticks replayed"):
+        running.add(ticks)
+        traces.add(ticks)
     numbers = range(1, len(traces.walks) + 1)
-    return running.finish(complete), [walk_of_trace(log, configuration, traces, number, complete) for number in numbers]
+    return running.finish(), [walk_of_trace(log, configuration, traces, number) for number in numbers]
 
 
 def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk]) -> MudLayout | None:

@@ -2,15 +2,16 @@
 
 A length that a damaged card has changed must cost neither gigabytes of memory nor a crash. The decompression therefore
 ends at the size that the chunk states, that size is limited (expansion.py), also by what LZ4 can reach, and the
-contents have to match their checksum. Most records of a log are ticks of one length, one after another: such a run is
-one array over the chunk's bytes.
+contents have to match their checksum. Messages of one channel and one length that follow one another, as most ticks do,
+are one array over the chunk's bytes.
 """
 
 import struct
 import zlib
 from collections.abc import Iterator
+from functools import cache
 from io import BytesIO
-from typing import NamedTuple
+from typing import TypeAlias
 
 import lz4.frame
 import numpy as np
@@ -25,19 +26,10 @@ from logs.files.expansion import LARGEST_CHUNK_BYTES
 LARGEST_RATIO = 256  # of LZ4, whose format allows 255
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-ROW_AT = RECORD_HEAD.size + MESSAGE_HEAD.size
+MOST_AT_ONCE = 1024  # messages, so that a chunk of many short runs costs no more than one of long ones
 
-
-class Row(NamedTuple):
-    """One message of the log, still encoded."""
-
-    channel_id: int
-    sequence: int
-    log_time_ns: int
-    data: bytes
-
-
-Record = Row | Schema | Channel
+Messages: TypeAlias = NDArray[np.void]  # at least one, all of one channel and one length, with the fields of LAYOUT
+Record: TypeAlias = Messages | Schema | Channel
 
 
 def open_chunk(chunk: Chunk) -> bytes:
@@ -72,42 +64,33 @@ def _open_zstd(stored: bytes, size: int) -> bytes:
 
 def split_records(contents: bytes) -> Iterator[Record]:
     """Yield the records of an opened chunk. Raises ValueError, struct.error or McapError where they are malformed."""
-    end = 0
-    while end < len(contents):
-        record, end = record_at(contents, end)
-        if record is not None:
-            yield record
+    start = 0
+    while start < len(contents):
+        opcode, length = RECORD_HEAD.unpack_from(contents, start)
+        inside, end = start + RECORD_HEAD.size, start + RECORD_HEAD.size + length
+        if end > len(contents):
+            raise ValueError("a record reaches beyond its chunk")
+        if opcode == Opcode.MESSAGE:
+            messages = _messages_at(contents, start, length)
+            yield messages
+            end = start + messages.nbytes
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            yield (Schema if opcode == Opcode.SCHEMA else Channel).read(ReadDataStream(BytesIO(contents[inside:end])))
+        start = end
 
 
-def record_at(contents: bytes, start: int) -> tuple[Record | None, int]:
-    """Return the record that starts there, None for one of another kind, and where it ends. Raises as above."""
-    opcode, length = RECORD_HEAD.unpack_from(contents, start)
-    start, end = start + RECORD_HEAD.size, start + RECORD_HEAD.size + length
-    if end > len(contents):
-        raise ValueError("a record reaches beyond its chunk")
-    if opcode == Opcode.MESSAGE:
-        if length < MESSAGE_HEAD.size:
-            raise ValueError("a row is shorter than its head")
-        channel_id, sequence, log_time_ns, _ = MESSAGE_HEAD.unpack_from(contents, start)
-        return Row(channel_id, sequence, log_time_ns, contents[start + MESSAGE_HEAD.size : end]), end
-    if opcode == Opcode.SCHEMA:
-        return Schema.read(ReadDataStream(BytesIO(contents[start:end]))), end
-    if opcode == Opcode.CHANNEL:
-        return Channel.read(ReadDataStream(BytesIO(contents[start:end]))), end
-    return None, end
+def _messages_at(contents: bytes, start: int, length: int) -> Messages:
+    """Return the messages that follow one another from `start` on."""
+    if length < MESSAGE_HEAD.size:
+        raise ValueError("a row is shorter than its head")
+    layout = _message_layout(length - MESSAGE_HEAD.size)
+    messages = np.frombuffer(contents, layout, min((len(contents) - start) // layout.itemsize, MOST_AT_ONCE), start)
+    is_other = np.logical_or.reduce([messages[name] != messages[name][0] for name in ("opcode", "length", "channel")])
+    return messages[: np.argmax(is_other)] if is_other.any() else messages
 
 
-def run_of_rows(contents: bytes, start: int, channel_id: int, size: int) -> NDArray[np.void]:
-    """Return the rows of `size` bytes of one channel that follow one another from `start` on; none where another does.
-
-    The next record starts `size + ROW_AT` bytes later for each of them.
-    """
-    names, formats = ["opcode", "length", "channel", "row"], ["u1", "<u8", "<u2", f"V{size}"]
-    layout = np.dtype({"names": names, "formats": formats, "offsets": [0, 1, RECORD_HEAD.size, ROW_AT]})
-    count = (len(contents) - start) // layout.itemsize
-    records = np.frombuffer(contents, layout, count, start)
-    is_other = records["opcode"] != Opcode.MESSAGE
-    is_other |= records["length"] != MESSAGE_HEAD.size + size
-    is_other |= records["channel"] != channel_id
-    rows: NDArray[np.void] = records["row"]
-    return rows[: np.argmax(is_other)] if is_other.any() else rows
+@cache
+def _message_layout(size: int) -> np.dtype[np.void]:
+    """The record of a message whose row has so many bytes."""
+    fields = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time_ns", "<u8")]
+    return np.dtype([*fields, ("publish_time_ns", "<u8"), ("row", f"V{size}")])

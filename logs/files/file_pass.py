@@ -1,23 +1,24 @@
-"""One pass over an MCAP file, whether or not its writer finished it: its ticks in pieces, then all the rest.
+"""One pass over an MCAP file, whether or not its writer finished it: its rows in their order, and all the rest.
 
-The records are read in order, without the index at the end, so a log whose writer was killed is read up to the byte
-where it ends. A pass reads what the file held when it, or an earlier pass, began: a file that grows meanwhile looks cut
-off there. A damaged file is refused, and the refusal names the byte. Rows have the schema that the file carries
+The records are read by their lengths, without the index at the end, so a log whose writer was killed is read up to the
+byte where it ends. A pass reads what the file held when it, or an earlier pass, began: a file that grows meanwhile
+looks cut off there. A damaged file is refused, and the refusal names the byte. A pass that salvages skips what is
+damaged instead, by its length, and ends where a length itself is damaged. Rows have the schema that the file carries
 (schema.py), so logs of older and newer versions are read. At any time one chunk is in memory.
 """
 
 import os
 import struct
 from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
 from math import inf
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Channel, Chunk, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
@@ -26,7 +27,7 @@ from firmware_host.log.log_file import ANNOTATION, ATTACHMENT, METADATA
 from firmware_host.log.log_folder import present_path
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
-from logs.files.chunks import RECORD_HEAD, Record, Row, open_chunk, record_at, run_of_rows
+from logs.files.chunks import RECORD_HEAD, Messages, Record, open_chunk, split_records
 from logs.files.expansion import Expansion
 from logs.files.log_error import ADVICE, DAMAGE, LogError, Watch, unwatched
 from logs.files.stored_logs import why_not_read
@@ -40,22 +41,24 @@ EVERYTHING: Spans = ((-inf, inf),)
 
 
 class FilePass:
-    """Owns what a pass has found so far; `ticks` makes the pass."""
+    """Owns what a pass has found so far; `ticks` makes the pass, or `rows`, which a pass that salvages uses."""
 
-    def __init__(self, path: Path, size: int | None = None, spans: Spans = EVERYTHING) -> None:
+    def __init__(self, path: Path, size: int | None = None, spans: Spans = EVERYTHING, salvages: bool = False) -> None:
         """`size` ends the pass before the file's end. Of the rows outside all spans it reads only the first chunk."""
-        self.path, self.size, self._spans = path, size, spans
-        self.complete = False  # whether the records reach the file's end
+        self.path, self.size, self._spans, self._salvages = path, size, spans, salvages
+        self.complete = False  # whether the records reach the file's end; of a pass that salvages: the end of the rows
         self.metadata: dict[str, str] = {}
         self.configuration_text = ""
-        self.kinds: dict[int, RowKind] = {}  # as the file describes them, by their number in ROW_KINDS
+        # As the file describes them, by their number in ROW_KINDS. Rows without a description are salvaged as those of
+        # this version, whose channels LogFile numbers from 1.
+        self.kinds: dict[int, RowKind] = dict(enumerate(ROW_KINDS)) if salvages else {}
+        self._number_of_channel: dict[int, int | None] = {number + 1: number for number in self.kinds}
+        self._schemas: dict[int, Schema] = {}
+        self._chunks = set[tuple[int, int, int]]()  # that were salvaged: a piece of a file may be in it twice
         self.messages = self.messages_counted = 0
-        self._ticks = 0
-        self._expansion = Expansion(path, 0)
+        self._ticks = self._position = 0
         self._misfit = ""  # the first row that is not as long as its description says
         self._encoded: dict[int, list[bytes]] = {STRIDE_KIND: [], EVENT_KIND: []}
-        self._schemas: dict[int, Schema] = {}
-        self._number_of_channel: dict[int, int | None] = {}  # None: an unknown topic, whose rows are only counted
 
     @property
     def tick_kind(self) -> RowKind:
@@ -65,54 +68,107 @@ class FilePass:
         """Yield the ticks in the order of the file. Raises LogError for a damaged or unreadable file."""
         try:
             with present_path(self.path).open("rb") as file:
-                stream = _Beginning(file, self.size)
-                self.size = stream.size
-                self._expansion = Expansion(self.path, stream.size)
-                yield from self._read(stream, watch)
+                for number, messages in self.rows(file, watch):
+                    self.messages += len(messages)
+                    if number == TICK_KIND:
+                        yield from self._fitting(messages["row"])
+                    elif number is not None:
+                        self._encoded[number] += [row.tobytes() for row in messages["row"]]
         except OSError as error:
             raise LogError(why_not_read(self.path, error)) from None
-
-    def _read(self, stream: "_Beginning", watch: Watch) -> Iterator[StoredTicks]:
-        if not stream.begins_as_mcap:
-            raise LogError(f"{self.path}: damaged at byte 0: this is not how an MCAP file begins")
-        reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=stream.size)  # type: ignore[arg-type]
-        try:
-            for record in reader.records:
-                yield from self._add(record)
-                watch("kB read", stream.position // 1000, stream.size // 1000)
         except LayoutError as error:
             raise LogError(f"{self.path}: {error}; {OTHER_VERSION}") from None
         except LogError:
             raise
         except DAMAGE as error:
-            if stream.ends_as_mcap or not _is_cut(error, stream.position == stream.size):
-                raise LogError(f"{self.path}: damaged before byte {stream.position}: {error}; {ADVICE}") from None
-            return
-        self.complete = True
+            raise LogError(f"{self.path}: damaged before byte {self._position}: {error}; {ADVICE}") from None
 
-    def _add(self, record: McapRecord | Record, checked: bool = False) -> Iterator[StoredTicks]:
-        """`checked` is whether a checksum has confirmed the record. Raises LayoutError, LogError, and DAMAGE."""
-        match record:
-            case Row() | Message():
-                yield from self._add_row(record.channel_id, record.data)
-            case Chunk() if not self._is_wanted(record):
-                return
-            case Chunk():
-                contents = open_chunk(record)
-                self._expansion.add(len(contents))
-                yield from self._add_chunk(contents, bool(record.uncompressed_crc))
-            case Schema():
-                self._schemas[record.id] = record
-            case Channel():
-                self._add_channel(record, checked)
-            case Attachment(name=name) if name == ATTACHMENT:
-                self.configuration_text = record.data.decode()
-            case Metadata(name=name) if name == METADATA:
-                self.metadata = record.metadata
-            case Metadata(name=name) if name == ANNOTATION:
-                self.metadata = self.metadata | record.metadata
-            case Statistics():
-                self.messages_counted = record.message_count
+    def _fitting(self, rows: StoredTicks) -> Iterator[StoredTicks]:
+        found, expected = rows.dtype.itemsize, self.tick_kind.layout.size
+        if found == expected:
+            yield rows
+        elif not self._misfit:
+            self._misfit = f"row {self._ticks + 1} of {self.tick_kind.topic} has {found} bytes, not {expected}"
+        self._ticks += len(rows)
+
+    def rows(self, file: BinaryIO, watch: Watch = unwatched) -> Iterator[tuple[int | None, Messages]]:
+        """Yield the rows with the number of their kind; None for those of an unknown topic, which are only counted.
+
+        Raises OSError, LayoutError, LogError, and DAMAGE unless the pass salvages.
+        """
+        for opcode, contents in self._records(file, watch):
+            try:
+                records = self._read(opcode, contents)
+            except DAMAGE:
+                if not self._salvages:
+                    raise
+                continue
+            for record in records:
+                if isinstance(record, Schema):
+                    self._schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    self._add_channel(record, opcode == Opcode.CHUNK)
+                else:
+                    yield self._number_of(int(record["channel"][0])), record
+
+    def _records(self, file: BinaryIO, watch: Watch) -> Iterator[tuple[int, bytes]]:
+        """Yield opcode and contents of each record, up to the footer or to a length that reaches beyond the file."""
+        descriptor, present = file.fileno(), os.fstat(file.fileno()).st_size
+        self.size = size = present if self.size is None else min(self.size, present)
+        self._expansion = Expansion(self.path, size)
+        if not self._salvages and os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
+            raise LogError(f"{self.path}: damaged at byte 0: this is not how an MCAP file begins")
+        position, opcode = len(MCAP0_MAGIC), 0
+        while (
+            opcode != Opcode.FOOTER
+            and len(head := os.pread(descriptor, RECORD_HEAD.size, position)) == RECORD_HEAD.size
+        ):
+            opcode, length = RECORD_HEAD.unpack(head)
+            position += RECORD_HEAD.size
+            contents = os.pread(descriptor, length, position) if position + length <= size else b""
+            self.complete = self._salvages and opcode == Opcode.DATA_END
+            if not opcode or self.complete or len(contents) < length or position > size:
+                break
+            position += length
+            self._position = position
+            watch("kB read", position // 1000, size // 1000)
+            yield opcode, contents
+        has_end = (
+            size > len(MCAP0_MAGIC) and os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
+        )
+        if not self._salvages and has_end:
+            self.complete = opcode == Opcode.FOOTER and position + len(MCAP0_MAGIC) == size
+            if not self.complete:
+                raise ValueError("a record does not end where the next one begins")
+
+    def _read(self, opcode: int, contents: bytes) -> list[Record]:
+        """Return the records of a chunk, or what stands outside of one. Raises DAMAGE, and LogError."""
+        stream = ReadDataStream(BytesIO(contents))
+        match opcode:
+            case Opcode.CHUNK:
+                return self._read_chunk(Chunk.read(stream))
+            case Opcode.ATTACHMENT if (attachment := Attachment.read(stream)).name == ATTACHMENT:
+                self.configuration_text = attachment.data.decode()
+            case Opcode.METADATA if (metadata := Metadata.read(stream)).name in (METADATA, ANNOTATION):
+                self.metadata = self.metadata | metadata.metadata
+            case Opcode.STATISTICS:
+                self.messages_counted = Statistics.read(stream).message_count
+            case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE if (
+                not self._salvages
+            ):  # no checksum has confirmed them
+                return list(split_records(RECORD_HEAD.pack(opcode, len(contents)) + contents))
+        return []
+
+    def _read_chunk(self, chunk: Chunk) -> list[Record]:
+        key = chunk.uncompressed_crc, chunk.uncompressed_size, chunk.message_start_time
+        if not self._is_wanted(chunk) or key in self._chunks:
+            return []
+        contents = open_chunk(chunk)
+        self._expansion.add(len(contents))
+        records = list(split_records(contents))
+        if self._salvages:
+            self._chunks.add(key)
+        return records
 
     def _is_wanted(self, chunk: Chunk) -> bool:
         """Whether some span has rows of the chunk; the first chunk, which describes the channels, always is."""
@@ -122,58 +178,23 @@ class FilePass:
         first_ns, last_ns = chunk.message_start_time - offset_ns, chunk.message_end_time - offset_ns
         return any(last_ns >= 1e9 * from_s and first_ns <= 1e9 * to_s for from_s, to_s in self._spans)
 
-    def _add_chunk(self, contents: bytes, checked: bool) -> Iterator[StoredTicks]:
-        position = 0
-        while position < len(contents):
-            run = self._run_of_ticks(contents, position)
-            if run is not None and len(run):
-                position += run.strides[0] * len(run)
-                self.messages += len(run)
-                self._ticks += len(run)
-                yield run
-                continue
-            record, position = record_at(contents, position)
-            if record is not None:
-                yield from self._add(record, checked)
-
-    def _run_of_ticks(self, contents: bytes, position: int) -> StoredTicks | None:
-        opcode, _ = RECORD_HEAD.unpack_from(contents, position)
-        if opcode != Opcode.MESSAGE or TICK_KIND not in self.kinds:
-            return None
-        (channel_id,) = struct.unpack_from("<H", contents, position + RECORD_HEAD.size)
-        if self._number_of_channel.get(channel_id) != TICK_KIND:
-            return None
-        return run_of_rows(contents, position, channel_id, self.tick_kind.layout.size)
-
-    def _add_row(self, channel_id: int, row: bytes) -> Iterator[StoredTicks]:
-        if channel_id not in self._number_of_channel:
+    def _number_of(self, channel_id: int) -> int | None:
+        if not self._salvages and channel_id not in self._number_of_channel:
             raise ValueError(f"a row of channel {channel_id}, which was not described")
-        number = self._number_of_channel[channel_id]
-        self.messages += 1
-        if number == TICK_KIND:
-            yield from self._add_tick(row)
-        elif number is not None:
-            self._encoded[number].append(row)
+        return self._number_of_channel.get(channel_id)
 
-    def _add_tick(self, row: bytes) -> Iterator[StoredTicks]:
-        self._ticks += 1
-        kind = self.tick_kind
-        if kind.fits(row):
-            yield np.frombuffer(row, f"V{kind.layout.size}", 1)
-        elif not self._misfit:
-            self._misfit = f"row {self._ticks} of {kind.topic} has {len(row)} bytes, not {kind.layout.size}"
-
-    def _add_channel(self, channel: Channel, checked: bool) -> None:
-        """A layout that no checksum has confirmed may be damage."""
-        number = KIND_OF_TOPIC.get(channel.topic)
-        self._number_of_channel[channel.id] = number
+    def _add_channel(self, channel: Channel, in_chunk: bool) -> None:
+        """A layout outside of a chunk, which no checksum has confirmed, may be damage."""
+        number = self._number_of_channel[channel.id] = KIND_OF_TOPIC.get(channel.topic)
         if number is None:
             return
         try:
             kind = described_kind(number, self._schemas.get(channel.schema_id), channel.metadata)
         except LayoutError as error:
-            raise error if checked else ValueError(str(error)) from None
-        if self.kinds.setdefault(number, kind).definition != kind.definition:
+            raise error if in_chunk else ValueError(str(error)) from None
+        if self._salvages:
+            self.kinds[number] = kind
+        elif self.kinds.setdefault(number, kind).definition != kind.definition:
             raise ValueError(f"{channel.topic} is described twice, differently")
 
     def require_all_rows(self) -> None:
@@ -207,45 +228,14 @@ class FilePass:
         return tuple(name for name in described if name not in present)
 
 
-class _Beginning:
-    """The first `size` bytes of a file as a stream; owns the position in it."""
-
-    def __init__(self, file: BinaryIO, size: int | None) -> None:
-        present = os.fstat(file.fileno()).st_size
-        self.size = present if size is None else min(size, present)
-        self.begins_as_mcap = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC and self.size >= len(MCAP0_MAGIC)
-        file.seek(max(0, self.size - len(MCAP0_MAGIC)))
-        self.ends_as_mcap = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC and self.size > len(MCAP0_MAGIC)
-        file.seek(0)
-        self.position = 0
-        self._file = file
-
-    def read(self, length: int) -> bytes:
-        wanted = min(length, self.size - self.position)
-        piece = self._file.read(wanted)
-        self.position += len(piece)
-        if len(piece) < wanted:  # the file was cut off meanwhile
-            self.size, self.ends_as_mcap = self.position, False
-        return piece
-
-
-def _is_cut(error: Exception, at_the_end: bool) -> bool:
-    """Whether the file ends where a record should continue, because the writer was killed."""
-    return isinstance(error, EndOfFile | RecordLengthLimitExceeded) or (isinstance(error, struct.error) and at_the_end)
-
-
 def described_kind(number: int, schema: Schema | None, metadata: Mapping[str, str]) -> RowKind:
     """Return the row kind of one of our topics as a file describes it. Raises LayoutError."""
     if schema is None:
         raise LayoutError(f"{ROW_KINDS[number].topic} is not described")
     definition = schema.data.decode(errors="replace")
-    rig = rig_of(metadata if "flippers" in metadata else {"flippers": _flippers_of_comments(definition)})
-    return read_definition(row_kinds(rig)[number], definition)
-
-
-def _flippers_of_comments(definition: str) -> str:
-    """Return the flippers whose joints the comments of a log of version 0.2 name, before they were metadata."""
-    return " ".join(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
+    # A log of version 0.2 names the joints of its flippers in comments, before they were metadata.
+    commented = " ".join(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
+    return read_definition(row_kinds(rig_of({"flippers": commented, **metadata}))[number], definition)
 
 
 def _field_names(kinds: Mapping[int, RowKind]) -> list[str]:

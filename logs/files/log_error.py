@@ -14,9 +14,5 @@ class LogError(ValueError):
     """A log that cannot be read: the message names the file, the byte or row, and the reason."""
 
 
-class LogCutError(LogError):
-    """A file was cut off between two passes over it: raised after the last row that is still there."""
-
-
 def unwatched(what: str, done: int, total: int) -> None:
     """Report no progress."""

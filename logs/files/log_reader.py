@@ -3,7 +3,7 @@
 The commands on logs read them in blocks instead (scanned_log.py), and work on a log in memory as on one block.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -12,7 +12,7 @@ import numpy as np
 
 from control.records import TWO_FLIPPERS, Rig
 from logs.files.file_pass import Spans
-from logs.files.log_error import LogCutError, LogError, Watch, unwatched
+from logs.files.log_error import LogError, Watch, unwatched
 from logs.files.scanned_log import ScannedLog, scan_logs
 from logs.files.tick_array import Ticks, whole_rows
 
@@ -46,40 +46,13 @@ class Log(NamedTuple):
 AnyLog: TypeAlias = Log | ScannedLog
 
 
-class TickPass:
-    """One pass over the ticks of a log, which reports its progress: `what` names the work, as "ticks replayed" does."""
-
-    def __init__(self, log: AnyLog, watch: Watch, what: str) -> None:
-        self._log, self._watch, self._what = log, watch, what
-        self._cut: LogCutError | None = None
-
-    def __iter__(self) -> Iterator[Ticks]:
-        """Yield blocks of ticks, up to a cut. Raises LogError."""
-        done = 0
-        try:
-            for ticks in self._log.blocks():
-                self._watch(self._what, done, self._log.rows)
-                yield ticks
-                done += len(ticks)
-        except LogCutError as cut:
-            self._cut = cut
-
-    @property
-    def complete(self) -> bool:
-        """False where the log was cut off before or during the pass."""
-        return self._log.complete and self._cut is None
-
-    def raise_cut(self) -> None:
-        """Raises LogCutError where the log was cut off during the pass."""
-        if self._cut is not None:
-            raise self._cut
-
-    def feed(self, *consumers: Callable[[Ticks], None]) -> bool:
-        """Feed every consumer; returns whether the log is complete. Raises LogError."""
-        for ticks in self:
-            for consume in consumers:
-                consume(ticks)
-        return self.complete
+def watched_blocks(log: AnyLog, watch: Watch, what: str) -> Iterator[Ticks]:
+    """Yield blocks of ticks and report progress: `what` names the work, as "ticks replayed" does. Raises LogError."""
+    done = 0
+    for ticks in log.blocks():
+        watch(what, done, log.rows)
+        yield ticks
+        done += len(ticks)
 
 
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf, fields: Sequence[str] = ()) -> Log:
@@ -97,22 +70,12 @@ def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -
     if fields:
         types = np.dtype([(name, types[name]) for name in fields])
     ticks, read = np.empty(scanned.rows, types), 0
-    passed = TickPass(scanned, watch, "ticks read")
-    for block in passed:
+    for block in watched_blocks(scanned, watch, "ticks read"):
         part = ticks[read : read + len(block)]
         read += len(block)
         if not fields:
             whole_rows(part)[:] = whole_rows(block)
         for name in fields:
             part[name] = block[name]
-    return Log(
-        metadata=scanned.metadata,
-        configuration_text=scanned.configuration_text,
-        ticks=ticks[:read],
-        strides=scanned.strides,
-        events=scanned.events,
-        complete=passed.complete,
-        unknown_fields=scanned.unknown_fields,
-        missing_fields=scanned.missing_fields,
-        rig=scanned.rig,
-    )
+    known = {name: getattr(scanned, name) for name in Log._fields if name != "ticks"}
+    return Log(ticks=ticks[:read], **known)

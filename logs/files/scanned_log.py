@@ -16,7 +16,7 @@ from control.records import Rig
 from firmware_host.log.rows import EVENT_KIND, STRIDE_KIND, rig_of
 from firmware_host.trial import METADATA_KEY
 from logs.files.file_pass import EVERYTHING, FilePass, Spans
-from logs.files.log_error import LogCutError, LogError, Watch, unwatched
+from logs.files.log_error import LogError, Watch, unwatched
 from logs.files.tick_array import BLOCK_ROWS, Ticks, TickTally, divide_ticks, in_groups, in_order
 
 
@@ -28,11 +28,11 @@ class ScannedFile(NamedTuple):
     rows: int
 
     def ticks(self, watch: Watch, spans: Spans) -> Iterator[Ticks]:
-        """Raises LogCutError where ticks that the scan read are no longer there, and LogError."""
+        """Raises LogError, also where ticks that the scan read are no longer there."""
         file_pass = FilePass(self.path, self.size, spans)
         yield from _divided_ticks(file_pass, watch)
-        if not file_pass.complete and file_pass.size != self.size:
-            raise LogCutError(f"{self.path}: was cut off while it was read: everything before the cut was read")
+        if file_pass.size != self.size:
+            raise LogError(f"{self.path}: was cut off while it was read: read it again")
 
 
 def _divided_ticks(file_pass: FilePass, watch: Watch) -> Iterator[Ticks]:
@@ -68,20 +68,10 @@ class ScannedLog(NamedTuple):
     def blocks(self, watch: Watch = unwatched, spans: Spans = ()) -> Iterator[Ticks]:
         """Yield the ticks in the order of their numbers. With spans, most ticks outside of them are left out.
 
-        Raises LogCutError after the last tick of a file that was cut off since the scan, and LogError.
+        Raises LogError, also where a file was cut off since the scan.
         """
-        cuts: list[LogCutError] = []
-        yield from in_order(self._in_files(watch, spans or self.spans, cuts), self.tally.farthest)
-        for cut in cuts:
-            raise cut
-
-    def _in_files(self, watch: Watch, spans: Spans, cuts: list[LogCutError]) -> Iterator[Ticks]:
-        """End at the first cut: without it, the segments after it would seem to follow the rows before."""
-        try:
-            for file in self.files:
-                yield from file.ticks(watch, spans)
-        except LogCutError as cut:
-            cuts.append(cut)
+        ticks = (block for file in self.files for block in file.ticks(watch, spans or self.spans))
+        yield from in_order(ticks, self.tally.farthest)
 
 
 def scan_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> ScannedLog:

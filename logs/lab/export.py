@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from control.records import JOINTS, Phase, Rig
 from logs.files.log_error import LogError, Watch, unwatched
-from logs.files.log_reader import AnyLog, TickPass
+from logs.files.log_reader import AnyLog, watched_blocks
 from logs.files.tick_array import Ticks
 from logs.lab.columns import (
     BODY_COLUMNS,
@@ -22,10 +22,10 @@ from logs.lab.columns import (
 Floats = NDArray[np.float64]
 
 
-def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> TickPass:
+def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> None:
     """Write the authors' head, columns and units. The settings are the gait and the depth of the first stride.
 
-    Return the pass over the rows, which knows whether the log was cut off meanwhile. Raises LogError.
+    Raises LogError.
     """
     try:
         gait = tomllib.loads(log.configuration_text).get("gait", {})
@@ -39,17 +39,15 @@ def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> TickPas
     names = list(_columns(log.ends[:0], log.rig, start_s, has_position))
     out.write(",".join(names) + "\n")
     formats = ["%d" if name == "turtle_state" else "%.9g" for name in names]
-    rows = TickPass(log, watch, "rows written")
-    for ticks in rows:
+    for ticks in watched_blocks(log, watch, "rows written"):
         columns = _columns(ticks, log.rig, start_s, has_position)
         np.savetxt(out, np.column_stack([*columns.values()]), fmt=formats, delimiter=",")
-    return rows
 
 
 def _read_ahead(log: AnyLog) -> tuple[float | None, bool]:
     """Return the depth of the first stride, and whether there is any position; reads as far as it must."""
     depth_m, has_position = None, False
-    for ticks in TickPass(log, unwatched, ""):
+    for ticks in log.blocks():
         inserted = ticks["phase"] == Phase.INSERTION
         if depth_m is None and np.any(inserted):
             depth_m = float(ticks["stride_depth_m"][inserted][0])
