@@ -16,7 +16,7 @@ from control.records import UNKNOWN, Phase
 from firmware_host.configuration.configuration import CaptureAxis, PoseParameters
 from logs.lab.columns import BODY_COLUMNS, ORIENTATION_COLUMNS
 from logs.lab.csv_table import CsvTable
-from logs.lab.findings import Finding, FindingKind
+from logs.lab.findings import FindingKind
 from logs.lab.log_rows import LogRows, runs
 
 Floats = NDArray[np.float64]
@@ -38,14 +38,12 @@ class BodyTrack(NamedTuple):
     pitch_rad: Floats  # of the nose upward, since the first known pose
 
 
-def read_body_track(
-    rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERTICAL_AXIS
-) -> tuple[BodyTrack, list[Finding]]:
-    """Return the track and what is to be reported about it. A file with x alone has the advance alone."""
+def read_body_track(rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERTICAL_AXIS) -> BodyTrack:
+    """Return the track, and report what must be known of it. A file with x alone has the advance alone."""
     unknown, nothing = np.full(len(rows.time_s), UNKNOWN), np.zeros(len(rows.time_s))
     columns = [name for name in BODY_COLUMNS if name in table.column]
     if not columns:
-        return BodyTrack(unknown, unknown, unknown), []
+        return BodyTrack(unknown, unknown, unknown)
     lost = _is_lost(np.column_stack([table.column[name] for name in columns]), rows.time_s)
     position_m = np.column_stack([table.column.get(name, nothing) for name in BODY_COLUMNS])
     position_m[lost] = UNKNOWN
@@ -55,9 +53,11 @@ def read_body_track(
     height_m = position_m[:, up] if BODY_COLUMNS[up] in columns else unknown
     pitch_rad = unknown if forward is None else np.arcsin(_rise(table, lost, forward, up))
     tilt_rad = np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))  # of the body's vertical, to any side
-    findings = [*_report_lost(rows, columns[0], lost), *_report_height(rows, height_m, BODY_COLUMNS[up])]
-    findings += _report_direction(rows, position_m, up, columns[0])
-    return BodyTrack(advance_m, height_m, pitch_rad), [*findings, *_report_tilt(rows, tilt_rad, pitch_rad)]
+    _report_lost(rows, columns[0], lost)
+    _report_height(rows, height_m, BODY_COLUMNS[up])
+    _report_direction(rows, position_m, up, columns[0])
+    _report_tilt(rows, tilt_rad, pitch_rad)
+    return BodyTrack(advance_m, height_m, pitch_rad)
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
@@ -104,52 +104,52 @@ def _rotation_matrices(quaternion: Floats) -> Floats:
     return matrices
 
 
-def _report_lost(rows: LogRows, column: str, lost: Truths) -> list[Finding]:
+def _report_lost(rows: LogRows, column: str, lost: Truths) -> None:
     """Report that motion capture lost the body, unless it never saw it."""
     periods = runs(lost)
     if not periods or np.all(lost):
-        return []
+        return
     lost_s = fsum(float(rows.time_s[each.stop - 1] - rows.time_s[each.start]) for each in periods)
     text = f"motion capture lost the body for {lost_s:.2f} s, in {len(periods)} period{'s' * (len(periods) > 1)}"
-    return [rows.finding(FindingKind.POSE, column, periods[0].start, text)]
+    rows.report(FindingKind.POSE, column, periods[0].start, text)
 
 
-def _report_height(rows: LogRows, height_m: Floats, column: str) -> list[Finding]:
+def _report_height(rows: LogRows, height_m: Floats, column: str) -> None:
     change_m, row = largest_change(height_m, rows.phase)
     if abs(change_m) < MUCH_HEIGHT_M:
-        return []
+        return
     verb = "sinks" if change_m < 0.0 else "rises"
     text = (
         f"the body {verb} by {1e3 * abs(change_m):.0f} mm after the first insertion; depths are those of a body at rest"
     )
-    return [rows.finding(FindingKind.POSE, column, row, text)]
+    rows.report(FindingKind.POSE, column, row, text)
 
 
-def _report_direction(rows: LogRows, position_m: Floats, up: int, column: str) -> list[Finding]:
+def _report_direction(rows: LogRows, position_m: Floats, up: int, column: str) -> None:
     """Report stances that moved the body to different sides: then the direction of the advance is not certain."""
     strokes = [np.delete(position_m[each], up, axis=1) for each in rows.strokes(Phase.STANCE)]
     known = [stroke[np.isfinite(stroke[:, 0])] for stroke in strokes]
     steps_m = np.array([stroke[-1] - stroke[0] for stroke in known if len(stroke)])
     if not len(steps_m):
-        return []
+        return
     sum_m, path_m = float(np.linalg.norm(steps_m.sum(axis=0))), float(np.linalg.norm(steps_m, axis=1).sum())
     if sum_m >= LEAST_AGREEMENT * path_m:
-        return []
+        return
     path = f"{1e3 * path_m:.0f} mm in different horizontal directions, {1e3 * sum_m:.0f} mm in all"
     text = f"the stances moved the body by {path}: the direction of the advance is uncertain"
-    return [rows.finding(FindingKind.POSE, column, int(np.argmax(rows.phase == Phase.STANCE)), text)]
+    rows.report(FindingKind.POSE, column, int(np.argmax(rows.phase == Phase.STANCE)), text)
 
 
-def _report_tilt(rows: LogRows, tilt_rad: Floats, pitch_rad: Floats) -> list[Finding]:
+def _report_tilt(rows: LogRows, tilt_rad: Floats, pitch_rad: Floats) -> None:
     tilt_rad = np.where(np.isfinite(tilt_rad) & rows.in_gait, tilt_rad, 0.0)
     row = int(np.argmax(tilt_rad))
     if tilt_rad[row] < MUCH_PITCH_RAD:
-        return []
+        return
     pitch = (
         f"{np.degrees(pitch_rad[row]):+.0f}° of it nose up" if np.isfinite(pitch_rad[row]) else "its side is not known"
     )
     text = f"the body tilts by {np.degrees(tilt_rad[row]):.0f}° from its first pose, {pitch}"
-    return [rows.finding(FindingKind.POSE, ORIENTATION_COLUMNS[0], row, text)]
+    rows.report(FindingKind.POSE, ORIENTATION_COLUMNS[0], row, text)
 
 
 def largest_change(values: Floats, phase: NDArray[np.int64]) -> tuple[float, int]:

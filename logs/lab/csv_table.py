@@ -42,7 +42,7 @@ class CsvTable(NamedTuple):
     line: Integers
     gait: dict[str, float]  # settings that are numbers
     missing_settings: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    findings: list[Finding]
 
 
 def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
@@ -59,11 +59,11 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
     if _is_torn(numbered[-1][1], len(names), places) and len(numbered) > 1:
         line = numbered.pop()[0]
         text = "the last row is incomplete and is dropped"
-        findings.append(Finding(FindingKind.TORN_ROW, column="", time_s=math.nan, line=line, text=text))
+        findings.append(Finding(FindingKind.TORN_ROW, "", math.nan, line, text))
     values = _parse_rows(path, numbered, len(names), places)
     line_of_row = np.array([number for number, _ in numbered], dtype=np.int64)
     column = dict(zip(kept, values.T, strict=True))
-    return _drop_rows(path, CsvTable(column, line_of_row, gait, missing, tuple(findings)))
+    return _drop_rows(path, CsvTable(column, line_of_row, gait, missing, findings))
 
 
 def _unpack(path: Path) -> bytes:
@@ -168,23 +168,22 @@ def _parse_row(path: Path, line: int, cells: Cells, width: int, places: list[int
 
 def _drop_rows(path: Path, table: CsvTable) -> CsvTable:
     """Drop the rows without a time or a state, and reports the cells that are empty in the others."""
-    findings = list(table.findings)
     known = np.isfinite(table.column[TIME]) & np.isfinite(table.column[STATE])
     if np.count_nonzero(known) < MOST_DROPPED * len(known):
         raise LogError(f"{path}: {np.count_nonzero(~known)} of {len(known)} rows have no time or no {STATE}")
     for name in (TIME, STATE):
-        findings += _report_empty(table, name, ~np.isfinite(table.column[name]), FindingKind.ROW_DROPPED)
+        _report_empty(table, name, ~np.isfinite(table.column[name]), FindingKind.ROW_DROPPED)
     for name, values in table.column.items():
-        findings += _report_empty(table, name, known & ~np.isfinite(values), FindingKind.EMPTY_CELL)
+        _report_empty(table, name, known & ~np.isfinite(values), FindingKind.EMPTY_CELL)
     column = {name: np.where(np.isfinite(values), values, np.nan)[known] for name, values in table.column.items()}
-    return table._replace(column=column, line=table.line[known], findings=tuple(findings))
+    return table._replace(column=column, line=table.line[known])
 
 
-def _report_empty(table: CsvTable, name: str, empty: NDArray[np.bool_], kind: FindingKind) -> list[Finding]:
+def _report_empty(table: CsvTable, name: str, empty: NDArray[np.bool_], kind: FindingKind) -> None:
     if not np.any(empty):
-        return []
+        return
     rows, first = int(np.count_nonzero(empty)), int(np.argmax(empty))
     consequence = "dropped" if kind is FindingKind.ROW_DROPPED else "without this value"
     text = f"no number in {rows} row{'s' * (rows > 1)}: {consequence}"
     time_s, line = float(table.column[TIME][first]), int(table.line[first])
-    return [Finding(kind, column=name, time_s=time_s, line=line, text=text)]
+    table.findings.append(Finding(kind, name, time_s, line, text))

@@ -47,8 +47,8 @@ class Evidence(NamedTuple):
         return self.stance_nm > max(FRICTION_LIMIT_NM, MUD_RATIO * friction_nm)
 
 
-def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Invert angles and currents where needed, in place; invalidates strides whose current has the wrong sign."""
+def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> None:
+    """Invert angles and currents where needed, in place; invalidate strides whose current has the wrong sign."""
     for joint, pushing in enumerate(PUSHING):
         if rows.change(angle_rad[:, joint], pushing) > 0.0:
             angle_rad[:, joint] *= -1.0
@@ -60,9 +60,12 @@ def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]
         if sign < 0.0:
             currents *= -1.0
     if evidence.is_mud:
-        reported = [*_check_holds(rows, current_a), *_check_swings(rows, angle_rad, current_a, FRICTION_LIMIT_NM)]
-        return [*reported, *_drop_contradictions(rows, angle_rad, current_a)]
-    return [_report_air(evidence), *_check_swings(rows, angle_rad, current_a, 0.0)]
+        _check_holds(rows, current_a)
+        _check_swings(rows, angle_rad, current_a, FRICTION_LIMIT_NM)
+        _drop_contradictions(rows, angle_rad, current_a)
+    else:
+        rows.findings.append(_air(evidence))
+        _check_swings(rows, angle_rad, current_a, 0.0)
 
 
 def _work(rows: LogRows, angles: Floats, currents: Floats, wanted: Phase) -> float:
@@ -126,7 +129,7 @@ def _hold_nm(rows: LogRows, currents: Floats) -> float:
     return PAPER_CONSTANT_NM_A * median_a if clear else 0.0
 
 
-def _report_air(evidence: Evidence) -> Finding:
+def _air(evidence: Evidence) -> Finding:
     if np.isnan(evidence.stance_nm):
         return of_whole_log(FindingKind.NO_MUD, "mud or air is not known: no stance has positions and currents")
     stance, swing = (f"{nm:.2f} N·m" if np.isfinite(nm) else "unknown" for nm in evidence)
@@ -134,9 +137,8 @@ def _report_air(evidence: Evidence) -> Finding:
     return of_whole_log(FindingKind.NO_MUD, text)
 
 
-def _check_holds(rows: LogRows, current_a: Floats) -> list[Finding]:
+def _check_holds(rows: LogRows, current_a: Floats) -> None:
     """Report an adduction whose work on the mud and whose hold in swing contradict each other."""
-    findings = []
     for joint in range(1, len(PUSHING), 2):
         hold_nm = _hold_nm(rows, current_a[:, joint])
         if hold_nm < -NEGATIVE_WEIGHT_NM:
@@ -144,13 +146,11 @@ def _check_holds(rows: LogRows, current_a: Floats) -> list[Finding]:
                 f"by its work on the mud this sign gives the arm a negative weight: {hold_nm:.2f} N·m hold it in swing"
             )
             first = int(np.argmax(rows.phase == Phase.SWING))
-            findings.append(rows.finding(FindingKind.SIGN, CURRENT_COLUMNS[joint], first, text))
-    return findings
+            rows.report(FindingKind.SIGN, CURRENT_COLUMNS[joint], first, text)
 
 
-def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_nm: float) -> list[Finding]:
+def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_nm: float) -> None:
     """Report a sweep whose sign by its stances makes the motor brake in the swings."""
-    findings = []
     for joint in range(0, len(PUSHING), 2):
         angles, currents = angle_rad[:, joint], current_a[:, joint]
         travel_rad = abs(float(rows.change(angles, Phase.SWING)))
@@ -161,20 +161,15 @@ def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_n
                 f"by the stances' sign the motor does negative work in swing, {work_j:.2f} J: the sign is not certain"
             )
             first = int(np.argmax(rows.phase == Phase.SWING))
-            findings.append(rows.finding(FindingKind.SIGN, CURRENT_COLUMNS[joint], first, text))
-    return findings
+            rows.report(FindingKind.SIGN, CURRENT_COLUMNS[joint], first, text)
 
 
-def _drop_contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
+def _drop_contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> None:
     """Invalidate the current in strides in which the mud would push the flipper."""
-    found = list(_contradictions(rows, angle_rad, current_a))
-    for joint, stroke, _, _ in found:
+    for joint, stroke, phase, torque_nm in list(_contradictions(rows, angle_rad, current_a)):
+        text = f"the mud drives the motor in {phase.name.lower()}: {torque_nm:+.2f} N·m; left out in this stride"
+        rows.report(FindingKind.SIGN, CURRENT_COLUMNS[joint], stroke.start, text)
         current_a[_stride_of(rows, stroke), joint] = np.nan
-    texts = [f"the mud drives the motor in {phase.name.lower()}: {nm:+.2f} N·m" for _, _, phase, nm in found]
-    return [
-        rows.finding(FindingKind.SIGN, CURRENT_COLUMNS[joint], stroke.start, f"{text}; left out in this stride")
-        for (joint, stroke, _, _), text in zip(found, texts, strict=True)
-    ]
 
 
 def _contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Iterator[tuple[int, slice, Phase, float]]:

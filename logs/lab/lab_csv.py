@@ -66,8 +66,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     """Read a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
     table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
     _refuse_missing(path, table)
-    phase, found = _read_phases(path, table)
-    rows = LogRows(path, table.column[TIME], table.line, phase)
+    rows = LogRows(path, table.column[TIME], table.line, _read_phases(path, table), table.findings)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
     joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
     moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
@@ -75,15 +74,15 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors
     commanded_m = table.column.get(DEPTH_COLUMN, np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)))
     current_limit_a = _find_limit_a(current_a)
-    found += check_ranges(rows, angle_rad, current_a)
+    check_ranges(rows, angle_rad, current_a)
     check_swapped_joints(rows, angle_rad)
-    found += drop_stuck_signals(rows, angle_rad, current_a)
-    found += orient(rows, angle_rad, current_a)
-    found += check_zero(rows, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
-    track, found_in_track = read_body_track(rows, table, vertical)
+    drop_stuck_signals(rows, angle_rad, current_a)
+    orient(rows, angle_rad, current_a)
+    check_zero(rows, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    track = read_body_track(rows, table, vertical)
     return LabLog(
         stamp_s=rows.time_s,
-        phase=phase,
+        phase=rows.phase,
         angle_rad=angle_rad,
         current_a=current_a,
         body_x_m=track.advance_m,
@@ -94,7 +93,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
         body_height_m=track.height_m,
         body_pitch_rad=track.pitch_rad,
         missing_settings=table.missing_settings,
-        findings=(*table.findings, *found, *found_in_track),
+        findings=tuple(rows.findings),
     )
 
 
@@ -112,7 +111,7 @@ def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:
     return np.column_stack([table.column.get(name, absent) for name in names])
 
 
-def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
+def _read_phases(path: Path, table: CsvTable) -> Integers:
     """Return the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
     state = table.column[STATE]
     known = np.isin(state, list(PHASE_OF_STATE))
@@ -120,7 +119,7 @@ def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
     phase = np.full(len(state), Phase.PAUSE, dtype=np.int64)
     phase[known] = phase_from_lowest[state[known].astype(np.int64) - min(PHASE_OF_STATE)]
     if np.all(known):
-        return phase, []
+        return phase
     first, count = int(np.argmin(known)), int(np.count_nonzero(~known))
     text = (
         f"the state {state[first]:g} is not known; {count} of {len(state)} rows have such a state and count as a pause"
@@ -128,7 +127,8 @@ def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
     found = Finding(FindingKind.UNKNOWN_STATE, STATE, float(table.column[TIME][first]), int(table.line[first]), text)
     if count > MOST_UNKNOWN * len(state):
         raise LogError(f"{path}: {found}")
-    return phase, [found]
+    table.findings.append(found)
+    return phase
 
 
 def _find_limit_a(current_a: Floats) -> float:

@@ -18,23 +18,25 @@ GAIT_PHASES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
 
 
 class LogRows(NamedTuple):
-    """What is known of each row besides its signals."""
+    """What is known of each row besides its signals, and what was noticed so far."""
 
     path: Path
     time_s: Floats
     line: Integers
     phase: Integers
+    findings: list[Finding]
 
     @property
     def in_gait(self) -> Truths:
         return np.isin(self.phase, GAIT_PHASES)
 
-    def finding(self, kind: FindingKind, column: str, row: int, text: str) -> Finding:
-        return Finding(kind, column=column, time_s=float(self.time_s[row]), line=int(self.line[row]), text=text)
+    def report(self, kind: FindingKind, column: str, row: int, text: str) -> None:
+        self.findings.append(Finding(kind, column, float(self.time_s[row]), int(self.line[row]), text))
 
     def refusal(self, kind: FindingKind, column: str, row: int, text: str) -> LogError:
         """Return the error of a log in which every number is wrong."""
-        return LogError(f"{self.path}: {self.finding(kind, column, row, text)}")
+        self.report(kind, column, row, text)
+        return LogError(f"{self.path}: {self.findings[-1]}")
 
     def change(self, values: Floats, wanted: Phase) -> Floats:
         """Return the sum of a signal's steps in a phase, column by column; steps from or to NaN do not count."""

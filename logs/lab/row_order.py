@@ -21,7 +21,6 @@ def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
     """Keep the longest series of rows whose times do not fall. Raises LogError where the times are of no use."""
     time_s = table.column[TIME]
     kept = longest_ascent(time_s)
-    findings = list(table.findings)
     if len(kept) < len(time_s):
         first = int(np.argmax(np.diff(time_s) < 0.0)) + 1
         dropped, back_s = len(time_s) - len(kept), float(time_s[first - 1] - time_s[first])
@@ -29,12 +28,12 @@ def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
         found = Finding(FindingKind.TIME, TIME, float(time_s[first]), int(table.line[first]), text)
         if dropped > MOST_DROPPED * len(time_s):
             raise LogError(f"{path}: {found}")
-        findings.append(found)
+        table.findings.append(found)
     column = {name: values[kept] for name, values in table.column.items()}
     step_s = float(np.median(np.diff(column[TIME]))) if len(kept) > 1 else 0.0
     if step_s > LONGEST_STEP_S:
         raise LogError(f"{path}: column {TIME}: rows are {step_s:g} s apart; times are in seconds")
-    return table._replace(column=column, line=table.line[kept], findings=tuple(findings))
+    return table._replace(column=column, line=table.line[kept])
 
 
 def longest_ascent(values: Floats) -> Integers:

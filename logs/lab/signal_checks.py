@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from control.records import FLIPPERS, Phase
 from logs.lab.columns import CURRENT_COLUMNS, POSITION_COLUMNS
-from logs.lab.findings import Finding, FindingKind
+from logs.lab.findings import FindingKind
 from logs.lab.log_rows import LogRows, runs
 
 Floats = NDArray[np.float64]
-Truths = NDArray[np.bool_]
 
 SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG = 100.0, 90.0  # to either side; beyond it the arm meets body or joint
 RANGES_DEG = (SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG) * 2
@@ -28,35 +27,31 @@ STALE_S = 0.5  # both hang; the logger repeats a state for up to 0.35 s
 AT_PEAK = 0.9995  # of the largest current: there the drive clips it, and it does not vary
 
 
-def check_ranges(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Invalidate samples beyond the mechanism and refuses a log that is mostly beyond it. Raises LogError."""
-    findings = []
-    for joint, column in enumerate(POSITION_COLUMNS):
-        size_deg = np.degrees(np.abs(angle_rad[:, joint]))
-        reason = f"beyond ±{RANGES_DEG[joint]:.0f}°, which the joint does not reach; positions are logged in turns"
-        turns = angle_rad[:, joint] / math.tau
-        findings += _check_range(rows, column, turns, size_deg > RANGES_DEG[joint], f"turns are {reason}")
-    for joint, column in enumerate(CURRENT_COLUMNS):
-        beyond = np.abs(current_a[:, joint]) > CURRENT_RANGE_A
-        reason = f"A are beyond ±{CURRENT_RANGE_A:.0f} A"
-        findings += _check_range(rows, column, current_a[:, joint], beyond, reason)
-    for signal in (angle_rad, current_a):
-        limits = np.radians(RANGES_DEG) if signal is angle_rad else np.full(len(RANGES_DEG), CURRENT_RANGE_A)
-        signal[rows.in_gait[:, None] & (np.abs(signal) > limits)] = np.nan
-    return findings
+def check_ranges(rows: LogRows, angle_rad: Floats, current_a: Floats) -> None:
+    """Invalidate samples beyond the mechanism and refuse a log that is mostly beyond it. Raises LogError."""
+    for joint, position in enumerate(POSITION_COLUMNS):
+        limit_deg = RANGES_DEG[joint]
+        reason = f"turns are beyond ±{limit_deg:.0f}°, which the joint does not reach; positions are logged in turns"
+        _check_range(rows, position, angle_rad[:, joint], math.radians(limit_deg), reason, math.tau)
+    for joint, current in enumerate(CURRENT_COLUMNS):
+        _check_range(rows, current, current_a[:, joint], CURRENT_RANGE_A, f"A are beyond ±{CURRENT_RANGE_A:.0f} A")
 
 
-def _check_range(rows: LogRows, column: str, value: Floats, beyond: Truths, reason: str) -> list[Finding]:
-    beyond = beyond & rows.in_gait
+def _check_range(
+    rows: LogRows, column: str, values: Floats, limit: float, reason: str, logged_unit: float = 1.0
+) -> None:
+    beyond = (np.abs(values) > limit) & rows.in_gait
     count, rows_in_gait = int(np.count_nonzero(beyond)), int(np.count_nonzero(rows.in_gait))
     if not count:
-        return []
+        return
     first = int(np.argmax(beyond))
-    text = f"{value[first]:.4g} {reason}; so {'is' if count == 1 else 'are'} {count} of {rows_in_gait} rows of the gait"
+    value = f"{values[first] / logged_unit:.4g}"
+    text = f"{value} {reason}; so {'is' if count == 1 else 'are'} {count} of {rows_in_gait} rows of the gait"
     if count > MOST_BEYOND * rows_in_gait:
         hint = "; are the units radians or degrees, or are positions and currents swapped?"
         raise rows.refusal(FindingKind.RANGE, column, first, text + hint * column.endswith("_pos"))
-    return [rows.finding(FindingKind.RANGE, column, first, text + ", which are left out")]
+    rows.report(FindingKind.RANGE, column, first, text + ", which are left out")
+    values[beyond] = np.nan
 
 
 def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
@@ -72,7 +67,7 @@ def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
             raise rows.refusal(FindingKind.RANGE, POSITION_COLUMNS[sweep], first, text)
 
 
-def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
+def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> None:
     """Invalidate signals that are bit-identical for a while in which their joint is not."""
     peak_a = float(np.nanmax(np.abs(current_a), initial=0.0))
     stuck = []
@@ -84,12 +79,10 @@ def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> l
         stuck += [(position, angles, held) for held in held_angles]
         stale = [held for held in _stale(rows, angles, currents) if not clipped[held.start]]
         stuck += [(position, angles, held) for held in stale] + [(current, currents, held) for held in stale]
-    findings = []
     for column, values, held in stuck:
         text = f"has the same value for {_duration_s(rows, held):.2f} s, so it is left out there"
-        findings.append(rows.finding(FindingKind.STUCK_SIGNAL, column, held.start, text))
+        rows.report(FindingKind.STUCK_SIGNAL, column, held.start, text)
         values[held] = np.nan
-    return findings
 
 
 def _stuck(rows: LogRows, values: Floats, other: Floats) -> list[slice]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from control.geometry import FlipperGeometry
 from control.records import FLIPPERS, Phase
 from logs.lab.columns import POSITION_COLUMNS
-from logs.lab.findings import Finding, FindingKind
+from logs.lab.findings import FindingKind
 from logs.lab.log_rows import LogRows
 
 Floats = NDArray[np.float64]
@@ -35,23 +35,26 @@ class Excursion(NamedTuple):
     commanded_m: float  # the largest; NaN where unknown
 
 
-def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction_m: float) -> list[Finding]:
-    """Refuse an adduction whose zero is wrong, invalidates one that may be, and reports an unexpected depth.
+def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction_m: float) -> None:
+    """Refuse an adduction whose zero is wrong, invalidate one that may be, and report an unexpected depth.
 
     `extraction_m` is the set height of the extraction, NaN where unknown. Raises LogError.
     """
     limit_m = GEOMETRY.clearance_m + DEPTH_TOLERANCE_M + (extraction_m if extraction_m >= 0.0 else EXTRACTION_HEIGHT_M)
-    findings = []
     for number in range(len(FLIPPERS)):
         excursion = _measure(rows, angle_rad[:, 2 * number], angle_rad[:, 2 * number + 1], commanded_m)
-        if excursion is not None:
-            column = POSITION_COLUMNS[2 * number + 1]
-            _refuse_zero(rows, column, excursion)
-            findings += _report_depth(rows, column, excursion)
-            if excursion.swing_m < -limit_m:
-                findings.append(_report_zero(rows, column, excursion, limit_m))
-                angle_rad[:, 2 * number + 1] = np.nan
-    return findings
+        if excursion is None:
+            continue
+        column = POSITION_COLUMNS[2 * number + 1]
+        _refuse_zero(rows, column, excursion)
+        _report_depth(rows, column, excursion)
+        if excursion.swing_m < -limit_m:
+            height = (
+                f"{-1e3 * excursion.swing_m:.0f} mm above the surface in swing, expected up to {1e3 * limit_m:.0f} mm"
+            )
+            text = f"the edge is {height}: the zero of the adduction is not certain, and its angles are left out"
+            rows.report(FindingKind.DEPTH, column, excursion.swing_row, text)
+            angle_rad[:, 2 * number + 1] = np.nan
 
 
 def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_m: Floats) -> Excursion | None:
@@ -91,19 +94,13 @@ def _refuse_zero(rows: LogRows, column: str, excursion: Excursion) -> None:
         raise rows.refusal(FindingKind.DEPTH, column, excursion.deepest_row, text)
 
 
-def _report_zero(rows: LogRows, column: str, excursion: Excursion, limit_m: float) -> Finding:
-    height = f"{-1e3 * excursion.swing_m:.0f} mm above the surface in swing, expected up to {1e3 * limit_m:.0f} mm"
-    text = f"the edge is {height}: the zero of the adduction is not certain, and its angles are left out"
-    return rows.finding(FindingKind.DEPTH, column, excursion.swing_row, text)
-
-
-def _report_depth(rows: LogRows, column: str, excursion: Excursion) -> list[Finding]:
+def _report_depth(rows: LogRows, column: str, excursion: Excursion) -> None:
     deepest_mm, commanded_mm = 1e3 * excursion.deepest_m, 1e3 * excursion.commanded_m
+    below_m, above_m = excursion.commanded_m * LEAST_DEPTH_FRACTION, excursion.commanded_m + DEPTH_TOLERANCE_M
     if excursion.deepest_m <= 0.0:
         text = f"the edge never reaches the surface; its lowest point is {-deepest_mm:.0f} mm above it"
-        return [rows.finding(FindingKind.DEPTH, column, excursion.deepest_row, text)]
-    below_m, above_m = excursion.commanded_m * LEAST_DEPTH_FRACTION, excursion.commanded_m + DEPTH_TOLERANCE_M
-    if excursion.deepest_m < below_m or excursion.deepest_m > above_m:
+    elif excursion.deepest_m < below_m or excursion.deepest_m > above_m:
         text = f"the greatest depth is {deepest_mm:.0f} mm, commanded are {commanded_mm:.0f} mm"
-        return [rows.finding(FindingKind.DEPTH, column, excursion.deepest_row, text)]
-    return []
+    else:
+        return
+    rows.report(FindingKind.DEPTH, column, excursion.deepest_row, text)
