@@ -9,8 +9,8 @@ from math import isfinite
 from typing import Any
 
 from control.records import NEVER_S
-from drivers.drive import DriveHealth, DriveParameters
-from drivers.drive_signals import DriveSignals
+from drivers.drive import DriveHealth
+from drivers.drive_axis import DriveAxis
 
 RESTART_SILENCE_S = 0.3
 MOST_UNANSWERED = 4  # questions; more were lost, and a second drive's answers must not be taken for theirs
@@ -18,10 +18,9 @@ SURPLUS_ANSWERS = 8  # in a row, none SURPLUS_S apart: a second drive
 SURPLUS_S = 1.0
 
 
-class AnsweringAxis(DriveSignals):
+class AnsweringAxis(DriveAxis):
     """Owns the numbers of questions and answers, and whether the drive is to follow torque."""
 
-    parameters: DriveParameters
     settings: Any  # that were read back; they are of the protocol's own type
 
     def reset(self) -> None:

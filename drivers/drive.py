@@ -1,18 +1,18 @@
 """The interface of motor drives, independent of the protocol that they speak.
 
-`DriveParameters` are the configuration of one drive. A `DriveAxis` is one drive as one joint; drivers/drives.py
-commands all of them together, in any mix of protocols. A `DriveHealth` contains what a drive reports about itself, as
-opposed to its joint. drivers/drive_type.py says what a protocol consists of.
+`DriveParameters` are the configuration of one drive. A `DriveHealth` contains what a drive reports about itself, as
+opposed to its joint. drivers/drive_axis.py is one drive as one joint; drivers/drives.py commands all of them together, in
+any mix of protocols. drivers/drive_type.py says what a protocol consists of.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
 from math import ceil
 from typing import Annotated, ClassVar, NamedTuple, Protocol
 
 from control.bounds import Bounds, Meaning
-from control.records import UNKNOWN, DriveState
+from control.records import UNKNOWN
 from drivers.can.frames import Frame
 
 FD = 1 << 29  # above every arbitration id
@@ -151,58 +151,3 @@ class Outlet(Protocol):
     """The path on which an axis sends its frames."""
 
     def send(self, frame: Frame) -> None: ...
-
-
-class DriveAxis(Protocol):
-    """One drive as one joint: what it reports, and the frames that command it."""
-
-    joint: str
-
-    @property
-    def parameters(self) -> DriveParameters: ...
-
-    @property
-    def closed_loop(self) -> bool:
-        """Return whether the drive follows torque, by its newest report."""
-
-    @property
-    def receivers(self) -> Mapping[int, Callable[[bytes, float], None]]:
-        """The handler of payload and stamp for each arbitration id to listen to; with the bit FD for CAN FD frames."""
-
-    @property
-    def state(self) -> DriveState: ...
-
-    @property
-    def health(self) -> DriveHealth: ...
-
-    def reset(self) -> None: ...
-
-    def limit_commands(self, largest_nm: float) -> None:
-        """State the largest torque that is ever commanded: a larger set-point is another program's."""
-
-    def begin_read(self, now_s: float) -> None:
-        """Begin a read: the frames that follow arrived between the previous call and `now_s`."""
-
-    def poll(self) -> None:
-        """Ask for all signals, where the drive reports only when asked."""
-
-    def send_torque(self, torque_nm: float) -> None: ...
-
-    def forget_commands(self) -> None:
-        """The last torques may not have left, so the drive may follow older ones."""
-
-    def prepare(self) -> None:
-        """Set what the drive needs to follow torque; it stays idle."""
-
-    def close_loop(self) -> None: ...
-
-    def disarm(self) -> None:
-        """Command zero torque and idle."""
-
-    def clear_errors(self) -> None: ...
-
-    def request_supply(self) -> None:
-        """Ask for voltage and current of the supply, where no other message reports them."""
-
-    def request_settings(self, now_s: float) -> None:
-        """Ask for settings that are unknown or were read long ago. It is called in every tick while idle."""

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, NamedTuple
 from drivers.bench.drive_bench import DriveBench
 from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame
-from drivers.drive import DriveAxis, DriveParameters, Outlet, WatchdogEndpoints
+from drivers.drive import DriveParameters, Outlet, WatchdogEndpoints
+from drivers.drive_axis import DriveAxis
 from drivers.transmit_gate import FrameKind, GateTable
 
 
@@ -38,7 +39,7 @@ class DriveType(ABC):
     """One protocol, and the drives that speak it."""
 
     parameters: ClassVar[type[DriveParameters]]  # the record of the configuration's `[drive.JOINT]`
-    axis: ClassVar[type[Any]]  # implements DriveAxis, and is made of a joint's name, its parameters and an outlet
+    axis: ClassVar[type[Any]]  # derived from DriveAxis; it is made of a joint's name, its parameters and an outlet
     command: ClassVar[FrameRate]  # that this program sends to each drive in every tick
     reports: ClassVar[tuple[FrameRate, ...]]  # that each drive sends cyclically, as the set-up instructions give it
     kind: ClassVar[FrameKind] = FrameKind()  # of the frames that this program sends; all drives of a bus need the same

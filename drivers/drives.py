@@ -13,7 +13,8 @@ from itertools import chain
 from control.records import NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, MalformedMessageError
-from drivers.drive import FD, DriveAxis, DriveHealth
+from drivers.drive import FD, DriveHealth
+from drivers.drive_axis import DriveAxis
 from drivers.transmit_gate import TransmitGate
 
 SUPPLY_TICKS = 10  # between questions for a supply, one drive after the other: 38 a second are 1 % of a bus at most

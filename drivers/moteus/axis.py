@@ -178,9 +178,6 @@ class MoteusAxis(AnsweringAxis):
             and self._read_s - self._disturbed_s < STOPPING_S
         )
 
-    def prepare(self) -> None:
-        """Does nothing: every torque command states the mode and all that it depends on."""
-
     def close_loop(self) -> None:
         """Let the torque commands that follow, and not the questions, leave."""
         self._following, self._reason, self._health = True, 0, None

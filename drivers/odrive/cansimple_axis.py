@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
-from drivers.drive_signals import DriveSignals
+from drivers.drive_axis import DriveAxis
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
@@ -32,7 +32,7 @@ TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
 
 
-class CanSimpleAxis(DriveSignals):
+class CanSimpleAxis(DriveAxis):
     """Owns everything that is known about one drive; each field contains the newest value that arrived."""
 
     COMMANDS: ClassVar[frozenset[int]]  # that a drive of this firmware obeys
@@ -183,9 +183,6 @@ class CanSimpleAxis(DriveSignals):
 
     def clear_errors(self) -> None:
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.CLEAR_ERRORS), self.CLEAR_ERRORS))
-
-    def poll(self) -> None:
-        """Does nothing: an ODrive reports by itself."""
 
     def request_supply(self) -> None:
         """Ask a drive that does not report its supply by itself."""

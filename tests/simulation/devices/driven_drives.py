@@ -9,7 +9,7 @@ from typing import Any
 from control.parameters.joint_limits import JointLimits
 from control.records import JOINTS, DriveState
 from drivers.can.mock_bus import MockBus
-from drivers.drive import DriveAxis
+from drivers.drive_axis import DriveAxis
 from drivers.drive_types import DRIVE_TYPES, make_drives
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive

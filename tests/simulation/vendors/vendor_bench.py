@@ -17,7 +17,8 @@ import can
 from control.parameters.joint_limits import JointLimits
 from drivers.can.can_port import PythonCanPort, frame_from, message_from
 from drivers.can.frames import MalformedMessageError
-from drivers.drive import DriveAxis, DriveParameters
+from drivers.drive import DriveParameters
+from drivers.drive_axis import DriveAxis
 from drivers.drive_types import DRIVE_TYPES
 from drivers.transmit_gate import TransmitGate
 from simulation.devices.drive import SimulatedDriveParameters

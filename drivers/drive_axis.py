@@ -1,18 +1,21 @@
-"""What the axes of all protocols have in common: the newest signals of one drive, and its report, built on a change.
+"""One drive as one joint: what it reports, and the frames that command it. Each protocol derives its own axis from it.
 
 An axis of a protocol sets the signals as its frames arrive, and sets `_health` to None where the report changes. The
 two parts of the report that change without a frame of the drive are compared at each reading.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 
 from control.records import NEVER_S, UNKNOWN, DriveState
-from drivers.drive import DriveHealth, Outlet
+from drivers.drive import DriveHealth, DriveParameters, Outlet
 from drivers.setpoint_monitor import SetpointMonitor
 
 
-class DriveSignals(ABC):
-    """Owns the newest value of every signal that arrived; a protocol derives its `DriveAxis` from it."""
+class DriveAxis(ABC):
+    """Owns the newest value of every signal that arrived."""
+
+    parameters: DriveParameters
 
     def __init__(self, joint: str, sign: int, outlet: Outlet, setpoints: SetpointMonitor) -> None:
         """`sign`: -1 for a mirrored motor. The protocol's axis calls `reset` at the end of its own."""
@@ -39,9 +42,11 @@ class DriveSignals(ABC):
         self._read_before_s, self._read_s = self._read_s, now_s
 
     def forget_commands(self) -> None:
+        """The last torques may not have left, so the drive may follow older ones."""
         self.setpoints.forget_commands()
 
     def limit_commands(self, largest_nm: float) -> None:
+        """State the largest torque that is ever commanded: a larger set-point is another program's."""
         self.setpoints.limit_commands(largest_nm)
 
     def _count_foreign_command(self) -> None:
@@ -92,3 +97,35 @@ class DriveSignals(ABC):
     @abstractmethod
     def duplicates(self) -> bool:
         """Return whether two drives seem to share this id."""
+
+    @property
+    @abstractmethod
+    def receivers(self) -> Mapping[int, Callable[[bytes, float], None]]:
+        """The handler of payload and stamp for each arbitration id to listen to; with the bit FD for CAN FD frames."""
+
+    def poll(self) -> None:  # noqa: B027 - most drives report by themselves
+        """Ask for all signals, where the drive reports only when asked."""
+
+    @abstractmethod
+    def send_torque(self, torque_nm: float) -> None: ...
+
+    def prepare(self) -> None:  # noqa: B027 - the commands of some state all that they need
+        """Set what the drive needs to follow torque, where its commands do not; it stays idle."""
+
+    @abstractmethod
+    def close_loop(self) -> None: ...
+
+    @abstractmethod
+    def disarm(self) -> None:
+        """Command zero torque and idle."""
+
+    @abstractmethod
+    def clear_errors(self) -> None: ...
+
+    @abstractmethod
+    def request_supply(self) -> None:
+        """Ask for voltage and current of the supply, where no other message reports them."""
+
+    @abstractmethod
+    def request_settings(self, now_s: float) -> None:
+        """Ask for settings that are unknown or were read long ago. It is called in every tick while idle."""
