@@ -1,8 +1,8 @@
 """The interface of motor drives, independent of the protocol that they speak.
 
 `DriveParameters` are the configuration of one drive. A `DriveHealth` contains what a drive reports about itself, as
-opposed to its joint. drivers/drive_axis.py is one drive as one joint; drivers/drives.py commands all of them together, in
-any mix of protocols. drivers/drive_type.py says what a protocol consists of.
+opposed to its joint. drivers/drive_axis.py is one drive as one joint; drivers/drives.py commands all of them together,
+in any mix of protocols. drivers/drive_type.py says what a protocol consists of.
 """
 
 from collections.abc import Iterator

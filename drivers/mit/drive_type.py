@@ -1,7 +1,6 @@
 """MIT mode as a drive type: its parameters, its axis, and how to read and forge its frames without commanding one."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
@@ -15,7 +14,6 @@ from drivers.mit.gate_table import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import LARGEST_ID, MitParameters
 from drivers.mit.settings import SUPPLY_V
-from drivers.transmit_gate import GateTable
 
 # All other signals of an answer arrive together or not at all: no code says that one is unknown.
 ROTOR_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(7, 8, bytes(1))}  # of a Damiao
@@ -31,6 +29,7 @@ class Mit(DriveType):
 
     parameters = MitParameters
     axis = MitAxis
+    gate_table = staticmethod(gate_table)
     bench = MitBench()
     example_error = OVERCURRENT
     command = FrameRate(codec.ANSWER_BYTES, RATE_HZ)
@@ -40,9 +39,6 @@ class Mit(DriveType):
         """Also those of the other maker's drives, which differ in the model alone."""
         node_id = parameters.node_id
         return frozenset({MASTER_ID, node_id, node_id + DAMIAO_OFFSET, codec.REGISTER_ID})
-
-    def gate_table(self, parameters: Any) -> GateTable:
-        return gate_table(parameters)
 
     def query(self, node_id: int) -> Frame:
         return Frame(node_id, codec.LEAVE)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
@@ -15,7 +14,6 @@ from drivers.moteus.bench import MoteusBench
 from drivers.moteus.codec import Mode
 from drivers.moteus.gate_table import KIND, gate_table
 from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID, MoteusParameters
-from drivers.transmit_gate import GateTable
 
 NAN, ABSENT = bytes.fromhex("0000c07f"), bytes.fromhex("80")
 SPANS: Mapping[str, Span] = {  # of the reply to a question for all signals: see codec.py
@@ -35,6 +33,7 @@ class Moteus(DriveType):
 
     parameters = MoteusParameters
     axis = MoteusAxis
+    gate_table = staticmethod(gate_table)
     bench = MoteusBench()
     kind = KIND
     example_error = MOTOR_DRIVER_FAULT
@@ -46,9 +45,6 @@ class Moteus(DriveType):
         return frozenset(
             identifier | FD for identifier in (codec.reply_id(node_id), codec.command_id(node_id), node_id)
         )
-
-    def gate_table(self, parameters: Any) -> GateTable:
-        return gate_table(parameters)
 
     def query(self, node_id: int) -> Frame:
         return codec.command_frame(node_id, codec.QUERY_ALONE)

@@ -18,7 +18,6 @@ from drivers.odrive.bench import OdriveBench
 from drivers.odrive.codec import AxisState, arbitration_id
 from drivers.odrive.gate_table import gate_table
 from drivers.odrive.parameters import OdriveParameters
-from drivers.transmit_gate import GateTable
 
 FAST, SLOW = FrameRate(8, 500.0), FrameRate(8, 10.0)  # every 2 and every 100 ms, as docs/how-to/odrive.md sets them
 GATE_DRIVER_FAULT = 0x20
@@ -53,6 +52,7 @@ class Odrive(CanSimple):
 
     parameters = OdriveParameters
     axis = OdriveAxis
+    gate_table = staticmethod(gate_table)
     bench = OdriveBench()
     commands = codec.COMMANDS
     signals = {
@@ -67,9 +67,6 @@ class Odrive(CanSimple):
         self, joint: str, parameters: Any, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
     ) -> OdriveAxis:
         return OdriveAxis(joint, parameters, outlet, endpoints)
-
-    def gate_table(self, parameters: Any) -> GateTable:
-        return gate_table(parameters)
 
     def announces(self, node_id: int) -> Frame:
         return Frame(arbitration_id(node_id, codec.HEARTBEAT), codec.HEARTBEAT.encode(0, AxisState.IDLE, 0, 0))

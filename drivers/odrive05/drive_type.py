@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.odrive.codec import LAST_COMMAND, AxisState, arbitration_id
@@ -12,7 +11,6 @@ from drivers.odrive05.axis import Odrive05Axis
 from drivers.odrive05.bench import Odrive05Bench
 from drivers.odrive05.gate_table import gate_table
 from drivers.odrive05.parameters import Odrive05Parameters
-from drivers.transmit_gate import GateTable
 
 
 class Odrive05(CanSimple):
@@ -20,6 +18,7 @@ class Odrive05(CanSimple):
 
     parameters = Odrive05Parameters
     axis = Odrive05Axis
+    gate_table = staticmethod(gate_table)
     bench = Odrive05Bench()
     commands = codec.COMMANDS
     signals = {
@@ -31,9 +30,6 @@ class Odrive05(CanSimple):
     }
     example_error = codec.ERROR_MOTOR
     reports = (FAST, FAST, *5 * (SLOW,))  # encoder, current; heartbeat, errors of three parts, voltage
-
-    def gate_table(self, parameters: Any) -> GateTable:
-        return gate_table(parameters)
 
     def announces(self, node_id: int) -> Frame:
         """Return the counts of an encoder, which firmware 0.6 does not report."""
