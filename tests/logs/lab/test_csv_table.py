@@ -43,7 +43,7 @@ HEADS = {
 def test_settings_and_rows_are_read_under_every_head(head: tuple[str, ...], tmp_path: Path) -> None:
     table = read_table(write(tmp_path / "run.csv", *head, COLUMNS, *ROWS), WANTED)
     assert table.gait == {"lateral_angle_range": 0.6, "insertion_angle": 0.03}
-    assert table.missing_settings == () and table.findings == ()
+    assert table.missing_settings == () and table.findings == []
     assert table.column["time"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
     assert table.column["second"].tolist() == pytest.approx([-0.05, -0.15, -0.25, -0.35, -0.45, -0.55][:6])
     assert set(table.column) == {"time", "turtle_state", "first", "second"}
@@ -136,7 +136,7 @@ def test_the_form_of_the_file_changes_nothing(form: Callable[[str], bytes], name
     path = tmp_path / name
     path.write_bytes(form(plain.read_text()))
     table, expected = read_table(path, WANTED), read_table(plain, WANTED)
-    assert table.gait == expected.gait and table.findings == expected.findings == ()
+    assert table.gait == expected.gait and table.findings == expected.findings == []
     for column in expected.column:
         np.testing.assert_array_equal(table.column[column], expected.column[column])
 
