@@ -67,7 +67,7 @@ class Recording:
 
         This is not the estimator's evaluation: a method cannot declare its own wrong values as air.
         """
-        rows = LogRows(Path(), self.stamp_s, np.arange(len(self.phase)), self.phase)
+        rows = LogRows(Path(), self.stamp_s, np.arange(len(self.phase)), self.phase, [])
         evidence = find_evidence(rows, self.angle_rad, self.current_a * self.torque_scale)
         return evidence.is_mud or isnan(evidence.stance_nm)
 

@@ -20,7 +20,7 @@ from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError
 from simulation.devices.simulated_drive import SimulatedDrive
-from simulation.harness.drive_presets import calibrated, with_drive_type
+from simulation.harness.drive_presets import calibrated
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
@@ -221,16 +221,6 @@ def test_a_lease_that_is_lost_ends_with_the_torque(robot: Lockstep) -> None:
     assert "lease of ben is over" in recorder_of(robot).texts
 
 
-def test_a_program_that_lost_its_lease_while_idle_does_not_arm(robot: Lockstep) -> None:
-    robot.loop.request(Request.DISARM, robot.now_s)
-    robot.run_for(0.02)
-    robot.loop.lease.renew("anna", robot.now_s, 1.0)
-    robot.loop.request(Request.ARM, robot.now_s)
-    robot.loop.lease.hang_up("anna")
-    robot.run_for(0.1)
-    assert robot.loop.mode is Mode.IDLE
-
-
 def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot: Lockstep) -> None:
     wanted_nm = same_for_all(0.05)
     robot.loop.controller.step = lambda *arguments: wanted_nm  # type: ignore[method-assign]
@@ -242,28 +232,6 @@ def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot
         assert (robot.loop.mode, robot.loop.sent.torques_nm) == (mode, NO_TORQUE)
         robot.run_for(0.02)
         robot.loop.request(Request.ARM, robot.now_s)
-
-
-@pytest.mark.parametrize(("drive_type", "overruled"), [("mit:AK80-9", "watchdog_unknown"), ("odrive", "")])
-def test_only_an_arming_that_overruled_a_fault_counts_as_forced(
-    example_text: str, drive_type: str, overruled: str
-) -> None:
-    robot = Lockstep(parse_configuration(calibrated(with_drive_type(example_text, drive_type))), FIRM)
-    robot.run_for(1.0)
-    assert (robot.loop.request(Request.ARM, robot.now_s) is not None) is bool(overruled)  # its watchdog cannot be read
-    robot.arm(forced="watchdog_unknown")
-    assert robot.loop.forced == overruled
-    robot.loop.request(Request.DISARM, robot.now_s)
-    robot.step()
-    assert not robot.loop.forced
-
-
-def test_firmware_of_another_family_is_not_armed(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulation.devices.odrive.device.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
-    robot = Lockstep(configuration, FIRM)
-    robot.run_for(1.0)
-    refused = robot.loop.request(Request.ARM, robot.now_s)
-    assert refused is not None and "firmware is 0.5.6" in refused
 
 
 def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Configuration) -> None:

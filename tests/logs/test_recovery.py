@@ -150,13 +150,6 @@ def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
     assert unfinished_files(tmp_path) == []
 
 
-def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) -> None:
-    path = make_cut_log(tmp_path)
-    path = path.rename(tmp_path / path.name)
-    recover_all(tmp_path, print)
-    assert read_log(path).complete and unfinished_files(tmp_path) == []
-
-
 def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
     """Write a log with another program's compression, or with other topics or another layout of its rows."""
     ticks = [payload for _, payload in make_ticks(0, 300)]
@@ -226,17 +219,6 @@ def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
     contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
     path.write_bytes(contents)
     assert recover_log(path).note == f"recovered: {4 * CHUNK} rows, {CHUNK} lost in damaged places"
-
-
-def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:
-    path = make_cut_log(tmp_path)
-    contents = bytearray(path.read_bytes())
-    start = contents.find(b"\x03\x00\x00\x00lz4") - 12  # the uncompressed size of the first chunk
-    contents[start : start + 8] = (1 << 60).to_bytes(8, "little")
-    path.write_bytes(contents)
-    with pytest.raises(LogError, match="cannot hold 1152921504606846976"):
-        read_log(path)
-    assert recover_log(path).rows == 4 * CHUNK
 
 
 def test_a_log_that_is_cut_off_during_its_recovery_stays_for_another_one(

@@ -92,15 +92,6 @@ def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(model: str) 
     assert bench.last == codec.LEAVE
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_command_has_the_sign_of_the_motor(sign: int) -> None:
-    bench = Bench(DAMIAO, sign=sign)
-    bench.enter()
-    bench.axis.send_torque(0.5)
-    torque_nm = codec.decode_torque(bench.last, bench.model.torque_nm)
-    assert torque_nm == pytest.approx(sign * 0.5, abs=0.01)
-
-
 def test_no_remembered_command_is_followed_on_entering() -> None:
     bench = Bench(DAMIAO)
     bench.axis.prepare()
@@ -175,20 +166,6 @@ def test_answers_under_the_master_id_count_for_their_own_drive() -> None:
     assert bench.axis.state.angle_rad == pytest.approx(1.0, abs=1e-3)
 
 
-@each_model
-def test_a_drive_that_answers_again_after_a_silence_has_restarted_and_follows_nothing(model: str) -> None:
-    bench = Bench(model)
-    bench.enter()
-    for _ in range(150):
-        bench.now_s += TICK_S
-        bench.axis.begin_read(bench.now_s)
-        bench.axis.send_torque(0.0)
-    bench.answer()
-    assert bench.axis.health.restarts == 1
-    bench.axis.send_torque(0.0)
-    assert bench.last == codec.LEAVE
-
-
 def test_errors_of_a_damiao_are_cleared_and_those_of_a_cubemars_only_end() -> None:
     for model, data in ((DAMIAO, codec.CLEAR), (CUBEMARS, codec.LEAVE)):
         bench = Bench(model)
@@ -227,17 +204,6 @@ def test_torque_that_stays_away_is_not_another_program_s() -> None:
         bench.axis.send_torque(0.5)
         bench.answer(codec.ENABLED, torque_nm=-0.5)
     assert bench.axis.health.setpoint_problem == ""
-
-
-def test_answers_to_questions_of_nobody_are_a_second_drive_s() -> None:
-    for questions, duplicate in ((1, False), (0, True)):
-        bench = Bench(DAMIAO)
-        for _ in range(20):
-            for _ in range(questions):
-                bench.axis.poll()
-                assert bench.last == codec.LEAVE
-            bench.answer()
-        assert bench.axis.health.duplicate_id is duplicate
 
 
 def test_answers_to_the_commands_of_another_program_are_no_second_drive_s() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import isnan, nan, pi
+from math import isnan, nan
 from random import Random
 
 import pytest
@@ -294,12 +294,6 @@ def test_any_message_after_a_silence_of_all_is_a_restart(
     bench.report(message, *((0, 1, 0, 0) if message is HEARTBEAT else (0.0, 0.0)), stamp_s=bench.now_s + 0.01)
     bench.read(bench.now_s + 0.01)
     assert bench.axis.health.restarts == restarts
-
-
-def test_the_speed_of_a_joint_is_in_radians(bench: Bench) -> None:
-    bench.report(GET_ENCODER_ESTIMATES, 0.25, 2.0)
-    bench.read(1.0)
-    assert bench.axis.state.velocity_rad_s == pytest.approx(4.0 * pi)
 
 
 def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import random
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,11 @@ import pytest
 
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import TICK, TICK_KIND
-from logs.files import scanned_log, tick_array
+from logs.files import scanned_log
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_logs
 from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_log, scan_logs
-from logs.files.tick_array import in_order
 from tests.firmware_host.synthetic_rows import encode_row
 
 TICKS = 3000
@@ -67,24 +66,6 @@ def test_segments_are_read_one_after_the_other_and_ticks_between_them_are_sorted
     assert [tick for block in log.blocks() for tick in block["tick"].tolist()] == sorted(numbers)
     assert log_summary(log) == log_summary(read_logs(paths))
     assert log.ends["tick"].tolist() == [0, TICKS - 1]
-
-
-def test_ticks_in_order_are_passed_on_as_soon_as_none_can_precede_them() -> None:
-    given = 0
-
-    def blocks() -> Iterator[tick_array.Ticks]:
-        nonlocal given
-        for start in range(0, 1000, 10):
-            given += 10
-            block = np.zeros(10, tick_array.tick_type())
-            block["tick"] = np.arange(start, start + 10)
-            yield block
-
-    passed = 0
-    for block in in_order(blocks(), farthest=25):
-        passed += len(block)
-        assert given - passed <= 26 or given == 1000
-    assert passed == 1000
 
 
 def peak_bytes(do: Callable[[], object]) -> int:
