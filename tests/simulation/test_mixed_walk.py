@@ -69,18 +69,6 @@ def test_the_mud_is_the_same_with_any_drives(types: tuple[str, str], mud: Mappin
     assert walked(text) == pytest.approx(dict(mud), rel=0.02)
 
 
-def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
-    text = with_drive_type(EXAMPLE, "mit:AK80-9")
-    robot = robot_with(text)
-    robot.run_for(1.0)
-    assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.WATCHDOG_UNKNOWN}
-    assert robot.loop.request(Request.ARM, robot.now_s) is not None
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0) and robot.loop.forced
-    robot.run_for(0.5)
-    assert robot.loop.mode is Mode.HOLD and robot.loop.drives.refused_commands == 0
-
-
 def test_drives_whose_watchdog_is_proven_are_armed_without_force() -> None:
     text = with_drive_type(EXAMPLE, "mit:AK80-9")
     configuration = parse_configuration(text)
