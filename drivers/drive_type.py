@@ -7,7 +7,7 @@ derived from `DriveType`. drivers/drive_types.py lists the types that exist.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from drivers.bench.drive_bench import DriveBench
@@ -40,7 +40,6 @@ class DriveType(ABC):
 
     parameters: ClassVar[type[DriveParameters]]  # the record of the configuration's `[drive.JOINT]`
     axis: ClassVar[type[Any]]  # derived from DriveAxis; it is made of a joint's name, its parameters and an outlet
-    gate_table: ClassVar[Callable[[Any], GateTable]]  # of everything that may leave for a drive with these parameters
     command: ClassVar[FrameRate]  # that this program sends to each drive in every tick
     reports: ClassVar[tuple[FrameRate, ...]]  # that each drive sends cyclically, as the set-up instructions give it
     kind: ClassVar[FrameKind] = FrameKind()  # of the frames that this program sends; all drives of a bus need the same
@@ -57,6 +56,11 @@ class DriveType(ABC):
     @abstractmethod
     def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
         """Return every arbitration id that this drive sends or obeys; with the bit FD for CAN FD frames."""
+
+    @staticmethod
+    @abstractmethod
+    def gate_table(parameters: Any) -> GateTable:
+        """List everything that may leave for one drive, of which `parameters` are those of this type."""
 
     @abstractmethod
     def announces(self, node_id: int) -> Frame:

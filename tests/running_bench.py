@@ -27,11 +27,11 @@ class Bench:
         self.folder, self.logs = folder, logs
         self.socket = folder / "mudskipper.sock"
         self.configuration = write_local_setup(folder, logs)
-        self.robot = self.start("simulation.harness.peer")
+        self.robot = self.start("command_line.main", "simulate")
         self.daemon = self.start("firmware_host.daemon")
 
-    def start(self, module: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", module, "--config", str(self.configuration)]
+    def start(self, module: str, *options: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", module, *options, "--config", str(self.configuration)]
         return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:

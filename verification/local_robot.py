@@ -46,9 +46,9 @@ class LocalRobot:
     """Owns the processes of a robot, which starts at once, and of its daemon. Each leads a session of its own."""
 
     def __init__(
-        self, folder: Path, log_lines: str = "", drive: str = DEFAULT, robot: str = "simulation.harness.peer"
+        self, folder: Path, log_lines: str = "", drive: str = DEFAULT, robot: str = "command_line.main simulate"
     ) -> None:
-        """`log_lines`: further lines of the configuration's log section. `robot`: the module to run as the robot."""
+        """`log_lines`: further lines of the configuration's log section. `robot`: the module to run as it."""
         self.logs, self.socket = folder / "logs", folder / "mudskipper.sock"
         self.configuration = write_local_setup(folder, self.logs)
         text = self.configuration.read_text(encoding="utf-8")
@@ -57,7 +57,7 @@ class LocalRobot:
         known = all(each.knows_watchdog for each in parse_configuration(text).drive.values())
         self.forced = "" if known else "watchdog_unknown"
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._start(robot)
+        self._start(*robot.split())
 
     def start_daemon(self, rate_hz: float = RATE_HZ) -> subprocess.Popen[bytes]:
         if rate_hz == RATE_HZ:

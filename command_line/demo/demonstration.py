@@ -53,7 +53,7 @@ class Demo:
         self.configuration_path = write_local_setup(folder, logs)
         self.output = (folder / "output.txt").open("w+", encoding="utf-8")
         ground = () if world is None else ("--world", str(world))
-        self.robot = self._start("simulation.harness.peer", "--seed", str(seed), *ground)
+        self.robot = self._start("command_line.main", "simulate", "--seed", str(seed), *ground)
         self.daemon = self._start("firmware_host.daemon")
         self._client: StatusClient | None = None
         self.strides: list[dict[str, Any]] = []
@@ -68,7 +68,7 @@ class Demo:
         blocked_before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         try:
             return subprocess.Popen(
-                [sys.executable, "-P", "-m", module, "--config", str(self.configuration_path), *arguments],
+                [sys.executable, "-P", "-m", module, *arguments, "--config", str(self.configuration_path)],
                 stdin=subprocess.DEVNULL,
                 stdout=self.output,
                 stderr=self.output,

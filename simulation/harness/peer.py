@@ -1,4 +1,4 @@
-"""The simulated robot as a process of its own, in real time, on the buses that a configuration names.
+"""The simulated robot of `mudskipper simulate`: in real time, on the buses that a configuration names.
 
 It takes from the configuration what a real robot's bench fixes: buses, node ids, signs, geometry, a fixed base. It
 sends the body's position to the configured pose source, at motion capture's rate. SIGUSR1 stands for the operator who
@@ -6,7 +6,6 @@ moves the flippers back by hand from their mechanical stops, beyond the limits: 
 `mudskipper simulate --reset` sends it, and with `--emergency-stop` SIGUSR2, which cuts the drives' power.
 """
 
-import argparse
 import ctypes
 import os
 import signal
@@ -20,7 +19,6 @@ from drivers.can.bus_lock import BusRole
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import load_configuration
 from firmware_host.ticker import Ticker
 from simulation.devices.pose_broadcast import PoseBroadcast
 from simulation.harness.blocks import on_blocks
@@ -86,17 +84,6 @@ def end_with_parent() -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="simulation.harness.peer", description=__doc__)
-    parser.add_argument("--config", type=Path, required=True)
-    ground = parser.add_mutually_exclusive_group()
-    ground.add_argument("--mud", action="append", choices=sorted(MUDS), help="water content in percent; repeatable")
-    ground.add_argument("--world", type=Path, help="file that describes the ground and more")
-    ground.add_argument("--on-blocks", action="store_true", help="for the bench: without mud, the flippers in air")
-    parser.add_argument("--seed", type=int, default=1)
-    return parser.parse_args(arguments)
-
-
 class Ground(NamedTuple):
     """Where the robot is: on muds of these water contents, in the world of a file, or on blocks in the air."""
 
@@ -149,16 +136,3 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
 def _refuse(*messages: str, status: int = 1) -> int:
     print("\n".join(messages), file=sys.stderr)
     return status
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
-    try:
-        ground = Ground(waters=options.mud, world=options.world, on_blocks=options.on_blocks)
-        return simulate(load_configuration(options.config), ground, options.seed)
-    except ConfigurationError as problem:
-        return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -213,16 +213,17 @@ def test_a_daemon_without_its_bus_waits_if_configured_and_else_exits_with_1(
 
 
 @pytest.mark.parametrize(
-    ("module", "role"), [("firmware_host.daemon", BusRole.COMMANDS), ("simulation.harness.peer", BusRole.DRIVES)]
+    ("program", "role"),
+    [(["firmware_host.daemon"], BusRole.COMMANDS), (["command_line.main", "simulate"], BusRole.DRIVES)],
 )
 def test_a_second_program_on_a_bus_is_refused_before_it_sends_a_frame(
-    short_folder: Path, tmp_path: Path, module: str, role: BusRole
+    short_folder: Path, tmp_path: Path, program: list[str], role: BusRole
 ) -> None:
     path = write_local_setup(short_folder, tmp_path / "logs")
     buses = load_configuration(path).bus
     ears = open_ports(buses)
     with lock_buses({"right": buses["right"]}, role):
-        command = [sys.executable, "-m", module, "--config", str(path)]
+        command = [sys.executable, "-m", *program, "--config", str(path)]
         second = subprocess.run(command, stderr=subprocess.PIPE, text=True, timeout=LONGEST_S, check=False)
     assert second.returncode == 1
     assert f"bus.right (mudskipper_local {short_folder}/right) does not open: process {os.getpid()}" in second.stderr

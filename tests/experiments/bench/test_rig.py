@@ -52,7 +52,7 @@ def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, shor
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
     """Yield the configuration of a simulated robot that runs in real time, in its own process, on local buses."""
     path = write_local_setup(short_folder, tmp_path)
-    command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(path), "--on-blocks"]
+    command = [sys.executable, "-m", "command_line.main", "simulate", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
     try:
         yield load_configuration(path)
