@@ -59,8 +59,8 @@ class DriveType(ABC):
 
     @staticmethod
     @abstractmethod
-    def gate_table(parameters: Any) -> GateTable:
-        """List everything that may leave for one drive, of which `parameters` are those of this type."""
+    def gate_table(drive: Any) -> GateTable:
+        """List everything that may leave for one drive, given its parameters of this type."""
 
     @abstractmethod
     def announces(self, node_id: int) -> Frame:
