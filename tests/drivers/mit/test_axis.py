@@ -157,15 +157,6 @@ def test_a_register_that_another_program_writes_is_its_command(node_id: int, kin
     assert bench.axis.health.foreign_commands == foreign
 
 
-def test_answers_under_the_master_id_count_for_their_own_drive() -> None:
-    bench = Bench(CUBEMARS)
-    answer = codec.encode_answer(Answer(NODE, 0, 1.0, 0.0, 0.0, 30.0, 0), bench.model)
-    bench.hear(0, bytes([NODE + 1]) + answer[1:])
-    assert bench.axis.state.angle_rad != bench.axis.state.angle_rad  # still unknown
-    bench.hear(0, answer)
-    assert bench.axis.state.angle_rad == pytest.approx(1.0, abs=1e-3)
-
-
 def test_errors_of_a_damiao_are_cleared_and_those_of_a_cubemars_only_end() -> None:
     for model, data in ((DAMIAO, codec.CLEAR), (CUBEMARS, codec.LEAVE)):
         bench = Bench(model)

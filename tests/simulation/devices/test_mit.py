@@ -9,7 +9,6 @@ from drivers.mit import codec
 from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
 from drivers.mit.settings import CONTROL_MODE, REGISTERS, TIMEOUT, TMAX
-from simulation.devices.drive import DriveError
 from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.mit.registers import write_frame
 from tests.drivers.bench.simulated_bus import simulated
@@ -17,7 +16,6 @@ from tests.simulation.devices.driven_drives import DrivenDrives
 
 STEP_NM = MODELS["DM4310"].torque_step_nm
 DAMIAO, CUBEMARS = "mit", "mit:AK80-9"
-both_makes = pytest.mark.parametrize("name", [DAMIAO, CUBEMARS])
 
 
 @pytest.fixture
@@ -68,14 +66,6 @@ def test_without_commands_a_cubemars_is_limp_reports_nothing_and_follows_the_nex
     assert drives.torque_nm() == pytest.approx(0.5, abs=0.01) and drives.state.error_flags == 0
 
 
-def test_a_drive_whose_watchdog_expired_is_not_commanded_back() -> None:
-    drives = DrivenDrives(DAMIAO)
-    drives.arm()
-    drives.devices[0].trip(DriveError.WATCHDOG)
-    drives.tick(0.2, count=5)
-    assert drives.axis.health.watchdog_expired and not drives.axis.closed_loop
-
-
 # registers
 
 
@@ -117,45 +107,6 @@ def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
 
 
 # other programs
-
-
-@both_makes
-def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(name: str) -> None:
-    drives = DrivenDrives(name)
-    drives.tick(count=3)
-    drives.devices[0].energised = True
-    drives.tick()
-    assert not drives.devices[0].energised
-
-
-@both_makes
-@pytest.mark.parametrize(("data", "counted"), [(codec.ENTER, 1), (codec.SET_ZERO, 1), (codec.LEAVE, 0)])
-def test_commands_of_another_program_are_counted(name: str, data: bytes, counted: int) -> None:
-    drives = DrivenDrives(name)
-    drives.tick(count=3)
-    drives.far.send(Frame(1, data))
-    drives.tick()
-    assert [axis.health.foreign_commands for axis in drives.drives.axes] == [counted, 0, 0, 0]
-
-
-def test_a_register_that_another_program_writes_counts_for_its_drive() -> None:
-    drives = DrivenDrives(DAMIAO)
-    drives.tick(count=3)
-    drives.far.send(write_frame(2, TMAX, 3.0))
-    drives.tick()
-    assert [axis.health.foreign_commands for axis in drives.drives.axes] == [0, 1, 0, 0]
-
-
-@both_makes
-def test_a_drive_that_another_program_makes_leave_the_mode_is_idle(name: str) -> None:
-    """No answer of a CubeMars states it."""
-    drives = DrivenDrives(name)
-    drives.arm()
-    drives.far.send(Frame(1, codec.LEAVE))
-    drives.devices[0].energised = False
-    drives.tick(0.2, count=2)
-    assert not drives.devices[0].energised
-    assert [axis.closed_loop for axis in drives.drives.axes] == [False, True, True, True]
 
 
 @pytest.mark.parametrize("name", [DAMIAO, CUBEMARS, "mit:AK80-64"])
