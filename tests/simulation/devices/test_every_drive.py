@@ -144,9 +144,9 @@ def test_late_and_repeated_values_are_of_the_past_and_the_newest_one_is_last(nam
 def test_malformed_frames_are_ignored(name: str) -> None:
     drives, random = DrivenDrives(name), Random(2)
     drives.arm()
-    known = list(drives.axis.receivers)
+    known = list(drives.axis.receivers)  # its reports and its commands
     for _ in range(400):
-        identifier = random.choice([known[0], random.randrange(0x800)])
+        identifier = random.choice([*known, random.randrange(0x800)])
         frame = Frame(identifier & 0x1FFFFFFF, random.randbytes(random.randint(0, 8)), is_remote=random.random() < 0.1)
         for device in drives.devices:
             device.receive(frame, drives.now_s)
