@@ -16,8 +16,8 @@ from drivers.bench.drive_setup import DriveSetup, FoundDrive, NoSetup
 from drivers.can.frames import Frame
 from drivers.mit import codec
 from drivers.mit.parameters import LARGEST_ID
-from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TMAX, VMAX
-from drivers.mit.setup import NOTHING, DamiaoSetup, is_answer, is_register, models_of, node_of, number_of
+from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TMAX, VMAX, number_of
+from drivers.mit.setup import NOTHING, DamiaoSetup, is_answer, is_register, models_of, node_of
 
 NAME = "mit"
 IDS = range(1, LARGEST_ID + 1)

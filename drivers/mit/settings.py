@@ -28,6 +28,10 @@ ANSWER_S = 0.1  # without an answer, after which reading begins again
 SAME_FRACTION = 0.001  # of a range
 
 
+def number_of(register: int, value: bytes) -> float:
+    return float((FLOAT if register in FLOATS else WORD).unpack(value)[0])
+
+
 class MitSettings:
     """Owns the registers of one drive that were read, and how far their reading has come."""
 
@@ -91,7 +95,7 @@ class MitSettings:
 
     def on_register(self, register: int, value: bytes) -> None:
         """Handle an answer, also one that was not asked for. A drive without a firmware version is only starting."""
-        number = float((FLOAT if register in FLOATS else WORD).unpack(value)[0])
+        number = number_of(register, value)
         if register == SOFTWARE and not number:
             self.forget()
             return

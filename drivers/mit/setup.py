@@ -6,7 +6,6 @@ on. Source: damiao-motor 1.0.6 (REGISTER_TABLE and store_parameters of core/moto
 """
 
 from collections.abc import Mapping, Sequence
-from struct import Struct
 
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.drive_setup import WATCHDOG_S, AskedSetup, FoundDrive, Setting, exactly
@@ -28,6 +27,7 @@ from drivers.mit.settings import (
     TMAX,
     VMAX,
     WORD,
+    number_of,
 )
 
 MST_ID, ESC_ID = 7, 8
@@ -43,11 +43,6 @@ NAMES = {
 STORING_S = 2.0
 GUIDE = "docs/how-to/mit.md"
 NOTHING = "in MIT mode it can be neither read nor written: use the makers' tool, and see docs/how-to/mit.md"
-
-
-def number_of(register: int, value: bytes) -> float:
-    layout: Struct = FLOAT if register in FLOATS else WORD
-    return float(layout.unpack(value)[0])
 
 
 def node_of(frame: Frame) -> int:

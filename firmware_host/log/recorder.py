@@ -40,7 +40,7 @@ REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
 
 
 class LogReport(NamedTuple):
-    """The state of the log and its disk."""
+    """The state of the log and its disk: the writer's message, after the log's path."""
 
     alive: bool  # the writer
     dropped: int  # rows, by the full pipe and by the writer
@@ -52,16 +52,6 @@ class LogReport(NamedTuple):
     repairing: int  # logs that earlier runs did not finish
 
 
-REPORT_TYPES = (
-    bool,
-    int,
-    str,
-    float,
-    int,
-    float,
-    float,
-    int,
-)  # of its fields, in the message of the writer after the log's path
 HEALTHY = LogReport(  # until the writer reports
     alive=True,
     dropped=0,
@@ -213,7 +203,8 @@ class Recorder:
         try:
             path, *values = json.loads(line)
             path = Path(path)
-            report = LogReport(*(kind(value) for kind, value in zip(REPORT_TYPES, values, strict=True)))
+            kinds = LogReport.__annotations__.values()
+            report = LogReport(*(kind(value) for kind, value in zip(kinds, values, strict=True)))
         except (TypeError, ValueError, OverflowError, RecursionError):
             self.malformed_reports += 1
             return False
