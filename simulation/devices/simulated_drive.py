@@ -13,14 +13,14 @@ energy that repeats n times a turn, so over a turn it does no work. It is no pur
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from math import cos, exp, isnan, nan, pi, radians, sin
 from random import Random
 
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateMessages
 
 TURN_RAD = 2.0 * pi
 SECOND_HARMONIC = 0.25
@@ -40,7 +40,6 @@ class SimulatedDrive(ABC):
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
-        self._late = LateMessages(random)
         self._unit_rad = TURN_RAD / self.units_per_turn
         self.reset(0.0)
 
@@ -54,7 +53,7 @@ class SimulatedDrive(ABC):
         self._forged_a = nan  # the current that the next answer reports
         self._given: list[Frame] = []  # answers that are still to be sent
         self._repeated: dict[object, bytes] = {}  # the newest values of each kind of message
-        self._late.reset()
+        self._in_transit: deque[tuple[float, Frame]] = deque()  # late messages: (arrival, frame)
 
     def restart(self, now_s: float) -> None:
         """Restart as after a supply dip: ignore and send nothing for `boot_s`; the angle stays."""
@@ -129,8 +128,17 @@ class SimulatedDrive(ABC):
     def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
         """Return the messages that arrive by now."""
         frames = self._due_frames(now_s) if now_s >= self._next_due_s else ()
-        longest_s = self.parameters.message_delay_s
-        return self._late.update(frames, now_s, longest_s) if longest_s else frames
+        return self._delayed(frames, now_s) if self.parameters.message_delay_s else frames
+
+    def _delayed(self, frames: Iterable[Frame], now_s: float) -> Iterator[Frame]:
+        """Yield the frames that arrive by now, stamped with the time of arrival; none overtakes another."""
+        for frame in frames:
+            arrival_s = now_s + self.parameters.message_delay_s * self._random.random()
+            if self._in_transit:
+                arrival_s = max(arrival_s, self._in_transit[-1][0])
+            self._in_transit.append((arrival_s, frame))
+        while self._in_transit and self._in_transit[0][0] <= now_s:
+            yield self._in_transit.popleft()[1]._replace(stamp_s=now_s)
 
     def _due_frames(self, now_s: float) -> Iterable[Frame]:
         """Return the messages that are sent now: here the answers that are late."""

@@ -13,6 +13,7 @@ state. Its angles are radians. A new zero outlasts a restart in a Damiao only.
 
 from math import isnan, nan
 from random import Random
+from typing import NamedTuple
 
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit import codec
@@ -20,15 +21,14 @@ from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
 from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, SUPPLY_V, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.mit.commands import AT_REST, decode_command
 from simulation.devices.mit.registers import answer_register, encode_value, first_values, write_frame
 from simulation.devices.simulated_drive import TURN_RAD, SimulatedDrive
 
 DEFAULT_MODEL = "DM4310"
+KP_NM_RAD, KD_NM_S_RAD = 500.0, 5.0  # the largest gains
+STEPS = 4095
 # The status of a Damiao; its last three bits are the fault that a CubeMars reports.
 ERRORS = {DriveError.OVERCURRENT: 0xA, DriveError.OVERSPEED: 0xE, DriveError.WATCHDOG: codec.LOST_COMMANDS}
-
-
 FORGED_COMMANDS = {Forgery.EMERGENCY_STOP: codec.LEAVE, Forgery.CLOSE_LOOP: codec.ENTER}
 FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
     Forgery.OLD_FIRMWARE: (SOFTWARE, 0.0),
@@ -36,6 +36,32 @@ FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
     Forgery.WATCHDOG_OFF: (TIMEOUT, 0.0),
     Forgery.OTHER_DRIVE: (SERIAL, float(0xABCDEF)),
 }
+
+
+class Command(NamedTuple):
+    """A command with gains, as a drive understands it."""
+
+    position_rad: float = 0.0
+    velocity_rad_s: float = 0.0
+    kp_nm_rad: float = 0.0
+    kd_nm_s_rad: float = 0.0
+    torque_nm: float = 0.0
+
+
+AT_REST = Command()
+
+
+def decode_command(data: bytes, position_rad: float, velocity_rad_s: float, torque_nm: float) -> Command:
+    """Decode a payload of eight bytes by a drive's ranges: unpack_cmd of Core/Src/can.c of bgkatz/motorcontrol."""
+    number = int.from_bytes(data, "big")
+    torque, kd, kp, velocity = (number >> shift & 0xFFF for shift in (0, 12, 24, 36))
+    return Command(
+        (number >> 48) * 2.0 * position_rad / 65535.0 - position_rad,
+        velocity * 2.0 * velocity_rad_s / STEPS - velocity_rad_s,
+        kp * KP_NM_RAD / STEPS,
+        kd * KD_NM_S_RAD / STEPS,
+        torque * 2.0 * torque_nm / STEPS - torque_nm,
+    )
 
 
 class SimulatedMit(SimulatedDrive):
