@@ -30,22 +30,28 @@ from simulation.harness.robot import SimulatedRobot
 from simulation.mud.disturbances import NONE, Disturbances, drive_changes
 from simulation.mud.track import Track
 
+FIXED_OF_DRIVE = frozenset(  # by the configuration
+    {
+        "type",
+        "node_id",
+        "sign",
+        "zero_turn",
+        "torque_constant_nm_a",
+        "current_limit_a",
+        "model",
+        "serial_number",
+        "velocity_range_rad_s",
+        "torque_range_nm",
+    }
+)
+GIVEN = FIXED_OF_DRIVE | {"encoder_counts", "encoder_direction", "watchdog_s"}  # as far as its type has them
+
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Return simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
-    of_all = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "serial_number")
-    given = (
-        *of_all,
-        "model",
-        "velocity_range_rad_s",
-        "torque_range_nm",
-        "encoder_counts",
-        "encoder_direction",
-        "watchdog_s",
-    )
     return {
         joint: SimulatedDriveParameters(
-            **({name: getattr(drive, name) for name in given if hasattr(drive, name)} | changes)
+            **({name: getattr(drive, name) for name in GIVEN if hasattr(drive, name)} | changes)
         )
         for joint, drive in configuration.drive.items()
     }

@@ -23,7 +23,7 @@ from firmware_host.configuration.toml_records import (
 )
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.harness.lockstep import drives_of, plant_of
+from simulation.harness.lockstep import FIXED_OF_DRIVE, drives_of, plant_of
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, clay_of_water
 from simulation.mud.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
 from simulation.mud.layer import Layer
@@ -35,20 +35,6 @@ STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's sti
 SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"rig", "geometry", "arm_mass", "disturbances", "fixed_base"})
-FIXED_OF_DRIVE = frozenset(
-    {
-        "type",
-        "node_id",
-        "sign",
-        "zero_turn",
-        "torque_constant_nm_a",
-        "current_limit_a",
-        "model",
-        "serial_number",
-        "velocity_range_rad_s",
-        "torque_range_nm",
-    }
-)
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness import world
 from simulation.harness.local_setup import configuration_text
-from simulation.harness.lockstep import Lockstep
-from simulation.harness.world import FIXED_OF_DRIVE, FIXED_OF_ROBOT, WorldText, parse_world
+from simulation.harness.lockstep import FIXED_OF_DRIVE, Lockstep
+from simulation.harness.world import FIXED_OF_ROBOT, WorldText, parse_world
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.firmware_host.harmless_frames import Observer, is_harmless

@@ -12,9 +12,8 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.lockstep import FIXED_OF_DRIVE, Lockstep
 from simulation.harness.world import (
-    FIXED_OF_DRIVE,
     FIXED_OF_ROBOT,
     WorldText,
     load_world,
