@@ -23,7 +23,7 @@ from control.records import UNKNOWN
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
-from experiments.reports.coefficient_table import GatheredCoefficient, gather_rows
+from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
@@ -121,7 +121,7 @@ def speed_of(strides: DataFrame) -> Entry:
 
 
 def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
-    return {name: gather_rows(estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS}
+    return {name: gather_coefficient(estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS}
 
 
 def _law_findings(estimates: DataFrame) -> list[str]:
