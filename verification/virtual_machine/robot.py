@@ -52,10 +52,6 @@ class Robot:
         report: dict[str, Any] = json.loads(self.operate("status", "--json").output)
         return report
 
-    def checks(self) -> dict[str, dict[str, Any]]:
-        """Return the lines of `mudskipper check` by their identity."""
-        return {item["id"]: item for item in json.loads(self.operate("check", "--json").output)}
-
     def unit(self, name: str) -> str:
         """Return a property of the service from systemd."""
         return self.shell(f"systemctl show --value --property={name} mudskipper").strip()
