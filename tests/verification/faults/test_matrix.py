@@ -21,10 +21,10 @@ from drivers.fault_injection.failure_table import BY_NAME, FAILURE_MODES, PHASES
 from experiments.study.workers import run_parallel
 from simulation.harness.drive_presets import DRIVES
 from verification.faults.cell import FORBIDDEN_TICKS, run_cell
+from verification.faults.energy_bounds import REACTING_TICKS
 from verification.faults.evaluation import Cell, problems
 from verification.faults.failing_robot import FaultBench
 from verification.faults.injection import ACTS
-from verification.faults.motor_energy import REACTING_TICKS
 from verification.faults.phases import bench_for, enter_phase
 from verification.faults.protocol_differences import BY_TYPE, differences, mode_of
 from verification.studies.faults import FAULTS
