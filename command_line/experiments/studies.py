@@ -44,7 +44,7 @@ from experiments.study.results_folder import (
 )
 from experiments.study.session import Ending, Session
 from experiments.study.values import folder
-from experiments.study.workers import LocalWorkers, Workers, WorkersError
+from experiments.study.workers import Workers, WorkersError, run_locally
 from firmware_host.configuration.file_problems import why_not
 from operator_client.status_client import CallRefusedError
 
@@ -253,10 +253,10 @@ def make_workers(
     ] = None,
 ) -> Workers:
     if cluster:
-        from experiments.study.cluster_workers import ClusterWorkers  # distributed is slow to import, and an extra
+        from experiments.study.cluster_workers import run_on_cluster  # distributed is slow to import, and an extra
 
-        return ClusterWorkers(cluster)
-    return LocalWorkers(workers)
+        return partial(run_on_cluster, address=cluster)
+    return partial(run_locally, processes=workers)
 
 
 def _end_early(folder: Path, problem: BaseException) -> int:

@@ -18,7 +18,7 @@ from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.study.notebook import Entry, Notebook, count_entries
 from experiments.study.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.study.session import Session
-from experiments.study.workers import LocalWorkers, run_parallel
+from experiments.study.workers import run_locally, run_parallel
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 
@@ -108,7 +108,7 @@ class SimulatedBench:
         def show_progress() -> None:
             self.session.show(sum(count_entries(folder / joint) for joint in plan.joints), total)
 
-        outcomes = run_parallel(joints, _discard, LocalWorkers(meanwhile=show_progress))
+        outcomes = run_parallel(joints, _discard, partial(run_locally, meanwhile=show_progress))
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self) -> list[Path]:

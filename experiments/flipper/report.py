@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from math import nan
-from pathlib import Path
 from statistics import fmean
 from typing import Any
 
@@ -14,7 +13,7 @@ from control.records import Phase
 from experiments.flipper.modelled_force import misfit_n, modelled_stride
 from experiments.flipper.plots import draw_coefficients, draw_stride
 from experiments.reports.coefficient_table import compared_frame, compared_rows, error_table, mud_summaries
-from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name, waters_of
 from experiments.reports.text_tables import number
@@ -29,6 +28,7 @@ from experiments.trials.coefficient_page import (
     truth_settings,
 )
 from experiments.trials.estimation_methods import configured_method
+from experiments.trials.mud_trials import MeasuredTrials
 from experiments.trials.stride_profile import stroke_of
 from experiments.trials.truth_file import TruthOfMud, truth_in
 from firmware_host.configuration.configuration import Configuration
@@ -60,33 +60,20 @@ Report = dict[str, Any]  # the summary, as it is in JSON
 Trials = dict[str, list[Entry]]  # by mud
 
 
-def trials_by_mud(muds: Sequence[str], entries: Mapping[str, Entry]) -> Trials:
-    """Return the trials in their order; other muds that were measured before follow those of this command."""
-    trials = sorted(entries.values(), key=lambda entry: int(entry["trial"]))
-    names = dict.fromkeys([*muds, *(entry["mud"] for entry in entries.values())])
-    by_mud = {mud: [trial for trial in trials if trial["mud"] == mud] for mud in names}
-    return {mud: own for mud, own in by_mud.items() if own}
-
-
 def result_of(
-    settings: Mapping[str, Any],
-    by_mud: Trials,
-    configuration: Configuration,
-    truth: TruthOfMud | None,
-    left_out: Mapping[str, Entry],
-    logs: Sequence[Path] = (),
+    settings: Mapping[str, Any], muds: Sequence[str], measured: MeasuredTrials, truth: TruthOfMud | None
 ) -> Result:
     """Report the trials that count. `truth` is another experiment's; without it the bed's own load cell is used."""
-    report = _report_of(by_mud, configuration, truth, left_out) | truth_settings(settings, configuration, truth, by_mud)
+    by_mud, configuration = trials_by_mud(muds, measured.entries), measured.configuration
+    report = _report_of(by_mud, configuration, truth) | {"left_out": measured.left_out}
+    report |= truth_settings(settings, configuration, truth, by_mud)
     method, firsts = report["settings"]["method"], {mud: trials[0] for mud, trials in by_mud.items()}
     compared = any(mud["truth"] for mud in report["muds"])
     coefficients = partial(draw_coefficients, report["muds"], firsts)
     figures = [Figure("figure5", CAPTION + COMPARED * compared, coefficients, MUDS)]
     for mud, trial in firsts.items():
-        draw, caption = (
-            partial(draw_stride, trial, configuration.geometry, method),
-            f"Figure 4 of the paper, mud {mud_text(mud)}.",
-        )
+        draw = partial(draw_stride, trial, configuration.geometry, method)
+        caption = f"Figure 4 of the paper, mud {mud_text(mud)}."
         figures.append(Figure(f"figure4_{file_name(mud)}", caption, draw, STRIDES))
     texts = {
         MUDS: _explanation(report),
@@ -100,37 +87,41 @@ def result_of(
         figures=figures,
         summary=report,
         title="A single flipper through muds",
-        texts=texts | remark_texts(remarks, left_out),
-        logs=logs,
+        texts=texts | remark_texts(remarks, measured.left_out),
+        logs=measured.logs,
     )
 
 
-def _report_of(
-    by_mud: Trials, configuration: Configuration, truth: TruthOfMud | None, left_out: Mapping[str, Entry]
-) -> Report:
+def trials_by_mud(muds: Sequence[str], entries: Mapping[str, Entry]) -> Trials:
+    """Return the trials in their order; other muds that were measured before follow those of this command."""
+    trials = sorted(entries.values(), key=lambda entry: int(entry["trial"]))
+    by_mud: Trials = {mud: [] for mud in [*muds, *(entry["mud"] for entry in entries.values())]}
+    for trial in trials:
+        by_mud[trial["mud"]].append(trial)
+    return {mud: own for mud, own in by_mud.items() if own}
+
+
+def _report_of(by_mud: Trials, configuration: Configuration, truth: TruthOfMud | None) -> Report:
     method, geometry = configured_method(configuration.estimation), configuration.geometry
-    rows = compared_frame(  # the first stride of each trial
-        row
-        for mud, trials in by_mud.items()
-        for trial in trials
-        for name, strides in trial["strides"].items()
-        for known in (truth_in(truth, mud) if truth else trial["truths"].get("0", {}),)
-        for row in (compared_rows(strides[0], known, mud=mud, method=name) if strides else ())
-    )
-    muds = mud_summaries(rows, by_mud, method, fmean)
-    for mud in muds:
-        mud["remarks"] = [remark for trial in by_mud[mud["mud"]] for remark in trial["remarks"]]
+    rows: list[Row] = []  # the first stride of each trial
+    for mud, trial in ((mud, trial) for mud, trials in by_mud.items() for trial in trials):
+        known = truth_in(truth, mud) if truth else trial["truths"].get("0", {})
+        for name, strides in trial["strides"].items():
+            rows += compared_rows(strides[0], known, mud=mud, method=name) if strides else []
+    compared = compared_frame(rows)
+    muds = mud_summaries(compared, by_mud, method, fmean)
+    for summary in muds:
+        summary["remarks"] = [remark for trial in by_mud[summary["mud"]] for remark in trial["remarks"]]
     plate = geometry.plate
     return {
         "experiment": "flipper",
         "muds": muds,
-        "errors": error_table(rows, "single flipper"),
+        "errors": error_table(compared, "single flipper"),
         "falls_with_water": {name: _falls_with_water(muds, name) for name in COEFFICIENTS},
         "largest_forces_n": {mud: _largest_forces_n(trials, method) for mud, trials in by_mud.items()},
         "misfit_n": {mud: _misfits_n(trials[0], configuration, method) for mud, trials in by_mud.items()},
         "later_strokes": _later_strokes([each["strides"][method] for trials in by_mud.values() for each in trials]),
         "plate_m": {"width": plate.width_m, "height": plate.height_m, "thickness": geometry.plate_thickness_m},
-        "left_out": left_out,
     }
 
 

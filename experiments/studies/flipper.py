@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from control.records import TWO_FLIPPERS, Rig
 from experiments.flipper.measurement import measure, require_bench
-from experiments.flipper.report import result_of, trials_by_mud
+from experiments.flipper.report import result_of
 from experiments.reports.mud_names import mud_name
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.study.notebook import Notebook
@@ -81,8 +81,7 @@ def study(
     simulated = partial(flipper_bench, session.operator, muds=muds, rig=rig)
     bench = open_bench(session, settings, lambda trial: INSTRUCTIONS, simulated, partial(require_bench, flipper))
     measure_trial = partial(measure, bench, flipper, depth / 100.0, strides)
-    configuration, entries, logs = run_trials(bench, session, planned, measure_trial)
-    return result_of(settings, trials_by_mud(muds, entries), configuration, known, bench.notebook.left_out, logs)
+    return result_of(settings, muds, run_trials(bench, session, planned, measure_trial), known)
 
 
 def bench_configuration(rig: Rig = TWO_FLIPPERS) -> Configuration:

@@ -166,7 +166,7 @@ def robot(
     trackway = bench.Trackway(bench.muds_of(mud) or PAPERS_MUDS, trials)
     robot_bench = open_bench(session, trackway.identity, lambda trial: INSTRUCTIONS)
     measure = partial(bench.measure, robot_bench, trackway)
-    configuration, entries, logs = run_trials(robot_bench, session, trackway.planned, measure)
+    configuration, entries, _, logs = run_trials(robot_bench, session, trackway.planned, measure)
     report = bench.report_of(trackway, entries, configuration.geometry.flipper_length_m)
     notes = [f"Trials left out: {report['left_out']}."] if report["left_out"] else []
     if without := report["strides_without_position"]:

@@ -73,8 +73,7 @@ def study(
     )
     known = load_truth(truth) if truth else None
     bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.operator, plan))
-    configuration, entries, logs = run_trials(bench, session, plan.planned, partial(measure, bench, plan))
-    return result_of(plan, entries, configuration, known, bench.notebook.left_out, logs)
+    return result_of(plan, run_trials(bench, session, plan.planned, partial(measure, bench, plan)), known)
 
 
 def _instructions(trial: PlannedTrial) -> str:

@@ -18,34 +18,29 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 from distributed.comm import CommClosedError
 
 from experiments.study.provenance import Record, identity, program_text
-from experiments.study.workers import Result, WorkersError
+from experiments.study.workers import WorkersError
 
 CONNECT_S = 10.0
 MOST_SUBMITTED = 1000  # trials at the scheduler at once; more than a cluster has processors
 
 
-class ClusterWorkers:
-    """The workers of the scheduler at an address such as tcp://10.0.0.7:8786."""
+def run_on_cluster(trials: Sequence[Callable[[], Any]], address: str) -> Generator[tuple[int, Any], None, None]:
+    """Be Workers: those of the scheduler at an address such as tcp://10.0.0.7:8786."""
+    with _connected(address) as client:
+        modules = sorted({getattr(trial, "func", trial).__module__ for trial in trials})
+        _require_this_program(client, modules)
+        waiting, program = iter(enumerate(trials)), identity(*modules)
 
-    def __init__(self, address: str) -> None:
-        self._address = address
+        def submit(most: int) -> list[Any]:
+            return [client.submit(_run, program, modules, *each, pure=False) for each in islice(waiting, most)]
 
-    def results(self, trials: Sequence[Callable[[], Result]]) -> Generator[tuple[int, Result], None, None]:
-        with _connected(self._address) as client:
-            modules = sorted({getattr(trial, "func", trial).__module__ for trial in trials})
-            _require_this_program(client, modules)
-            waiting, program = iter(enumerate(trials)), identity(*modules)
-
-            def submit(most: int) -> list[Any]:
-                return [client.submit(_run, program, modules, *each, pure=False) for each in islice(waiting, most)]
-
-            ended = as_completed(submit(MOST_SUBMITTED))
-            for future in ended:
-                yield future.result()
-                ended.update(submit(1))
+        ended = as_completed(submit(MOST_SUBMITTED))
+        for future in ended:
+            yield future.result()
+            ended.update(submit(1))
 
 
-def _run(program: Record, modules: Sequence[str], index: int, trial: Callable[[], Result]) -> tuple[int, Result]:
+def _run(program: Record, modules: Sequence[str], index: int, trial: Callable[[], Any]) -> tuple[int, Any]:
     """Run a trial on a worker. Raises WorkersError where it runs another program."""
     _require_same("a worker", identity(*modules), program)
     return index, trial()

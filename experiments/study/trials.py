@@ -14,7 +14,7 @@ from pandas import DataFrame
 
 from experiments.study.notebook import Entry, Notebook
 from experiments.study.session import Show
-from experiments.study.workers import Result, Workers, run_parallel
+from experiments.study.workers import Result, Workers, run_locally, run_parallel
 
 Row = Mapping[str, Any]
 
@@ -22,7 +22,7 @@ Row = Mapping[str, Any]
 class Trials:
     """The rows of one study, its folder, and what runs them."""
 
-    def __init__(self, folder: Path, plan: Mapping[str, Any], show: Show, workers: Workers | None = None) -> None:
+    def __init__(self, folder: Path, plan: Mapping[str, Any], show: Show, workers: Workers = run_locally) -> None:
         """`plan` has what must be the same when the study continues."""
         self.folder = folder  # exists
         self.measured: list[DataFrame] = []  # of each call of `run`, also of one that was interrupted

@@ -174,19 +174,21 @@ def open_bench(
     return Bench(robot, session.operator, notebook, partial(prepare_by_hand, robot, session.operator, instructions))
 
 
-def run_trials(
-    bench: Bench, session: Session, planned: Sequence[PlannedTrial], measure: Measure
-) -> tuple[Configuration, dict[str, Entry], list[Path]]:
-    """Run the trials; return the robot's configuration, the entries that count, and the logs.
+class MeasuredTrials(NamedTuple):
+    configuration: Configuration  # the robot's
+    entries: dict[str, Entry]  # that count
+    left_out: dict[str, Entry]
+    logs: list[Path] = []
 
-    The robot is left at rest, however they end. Raises BenchError where no entry counts.
-    """
+
+def run_trials(bench: Bench, session: Session, planned: Sequence[PlannedTrial], measure: Measure) -> MeasuredTrials:
+    """Run the trials. The robot is left at rest, however they end. Raises BenchError where no entry counts."""
     try:
         configuration = bench.robot.configuration
         conduct_trials(bench, planned, measure, session.show)
     finally:
         logs = leave(bench.robot, session.operator, session.folder)
-    return configuration, counted_entries(bench.notebook), logs
+    return MeasuredTrials(configuration, counted_entries(bench.notebook), bench.notebook.left_out, logs)
 
 
 def counted_entries(notebook: Notebook) -> dict[str, Entry]:

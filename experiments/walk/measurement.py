@@ -62,15 +62,18 @@ class WalkTrials:
         return {"experiment": "walk"} | {key: value for key, value in asdict(self).items() if key != "trials"}
 
     @property
+    def over(self) -> str:
+        """The name of the group of walks over all muds."""
+        return " ".join(name for name, _ in self.muds)
+
+    @property
     def planned(self) -> list[PlannedTrial]:
         """The walks over all muds, then those at both depths in each soft mud."""
-        over = {"walk": " ".join(name for name, _ in self.muds)}
-        groups = over | {f"soft {name}": name for name, *_ in self.soft_walks}
-        numbers = range(1, self.trials + 1)
+        groups = {"walk": self.over} | {f"soft {name}": name for name, *_ in self.soft_walks}
         return [
             PlannedTrial(f"{key}/{number}", group, number, self.trials)
             for key, group in groups.items()
-            for number in numbers
+            for number in range(1, self.trials + 1)
         ]
 
     @property

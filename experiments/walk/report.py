@@ -7,7 +7,6 @@ and that this drag was about 2.5 N.
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
@@ -41,6 +40,7 @@ from experiments.trials.coefficient_page import (
     truth_settings,
 )
 from experiments.trials.estimation_methods import configured_method
+from experiments.trials.mud_trials import MeasuredTrials
 from experiments.trials.stride_profile import profile_from, stroke_of
 from experiments.trials.truth_file import TruthOfMud, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
@@ -82,108 +82,93 @@ FIGURE_7 = (
 )
 FINDINGS = "The paper's findings, and ours by its law below the default method's surface"
 Report = dict[str, Any]  # the summary, as it is in JSON
+Walks = dict[str, list[Entry]]  # by group
 
 
-def result_of(
-    plan: WalkTrials,
-    entries: Mapping[str, Entry],
-    configuration: Configuration,
-    truth: TruthOfMud | None,
-    left_out: Mapping[str, Entry],
-    logs: Sequence[Path] = (),
-) -> Result:
+def result_of(plan: WalkTrials, measured: MeasuredTrials, truth: TruthOfMud | None) -> Result:
     """Report the walks that count. `truth` of another experiment replaces the bed's."""
-    strides = compared_strides(plan, entries, configuration, truth)
-    report = _report_of(plan, entries, strides, configuration, left_out)
+    configuration, walks = measured.configuration, walks_of(plan, measured.entries)
+    strides = compared_strides(plan, walks, reach_of(configuration), truth)
+    report = _report_of(plan, walks, strides, configured_method(configuration.estimation))
+    report["remarks"] = [f"{key}: {remark}" for key, entry in measured.entries.items() for remark in entry["remarks"]]
+    report["left_out"] = measured.left_out
     report |= truth_settings(plan.identity, configuration, truth, dict.fromkeys([*dict(plan.muds), *plan.soft]))
     findings = DataFrame(report["beside_paper"]).rename(columns={"what": ""})
     findings["ours"] = [number(ours, 2) for ours in findings["ours"]]
-    sections = {soft["mud"]: f"Soft mud, {mud_text(soft['mud'])}" for soft in report["soft"] if soft["depths"]}
     drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
+    sections = [_soft_section(soft) for soft in report["soft"] if soft["depths"]]
     texts = {
         TRACK: _explanation(report, configuration),
-        **dict.fromkeys(list(sections.values())[:1], drag),  # the first one explains what all have in common
+        **dict.fromkeys(sections[:1], drag),  # the first one explains what all have in common
         COMPARISON: METHODS if report["errors"] else "",
     }
     return Result(
         tables=[*coefficient_tables(report, TRACK), Table("findings", FINDINGS, {}, findings, "Findings")],
-        figures=list(_figures(plan, entries, strides, report, sections, reach_of(configuration))),
+        figures=list(_figures(plan, walks, strides, report["soft"], reach_of(configuration))),
         summary=report,
         title="The walking robot over several muds",
-        texts=texts | remark_texts(report["remarks"], left_out),
-        logs=logs,
+        texts=texts | remark_texts(report["remarks"], measured.left_out),
+        logs=measured.logs,
     )
 
 
-def walks_of(plan: WalkTrials, entries: Mapping[str, Entry], group: str = "") -> list[Entry]:
-    """Return the walks in a soft mud at one depth, or those over all muds."""
-    own = [trial.key for trial in plan.planned if trial.group == (group or plan.planned[0].group)]
-    return [entries[key] for key in own if key in entries]
+def walks_of(plan: WalkTrials, entries: Mapping[str, Entry]) -> Walks:
+    """Return the planned walks that count by their group."""
+    walks: Walks = {trial.group: [] for trial in plan.planned}
+    for trial in plan.planned:
+        walks[trial.group] += [entries[trial.key]] if trial.key in entries else []
+    return walks
 
 
-def compared_strides(
-    plan: WalkTrials, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
-) -> DataFrame:
+def compared_strides(plan: WalkTrials, walks: Walks, reach_m: float, truth: TruthOfMud | None) -> DataFrame:
     """Return the strides of the walks over all muds, each in its mud, and those in soft muds, named with the depth.
 
     The first stride of a walk in soft mud starts from a standing body and is left out; it has no `plates_m`.
     """
-    rows, layout, reach_m = list[Row](), plan.layout, reach_of(configuration)
-
-    def add(mud: str, walk: Entry, method: str, stride: Mapping[str, Any], name: str = "", **keys: Any) -> None:
-        known = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
-        rows.extend(compared_rows(stride, known, mud=name or mud, method=method, **keys))
-
-    for walk in walks_of(plan, entries):
+    rows, layout, soft = list[Row](), plan.layout, {name: mud for name, mud, _ in plan.soft_walks}
+    for group, walk in ((group, walk) for group, own in walks.items() for walk in own):
         for method, strides in walk["strides"].items():
             for index, stride in enumerate(strides):
-                plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
-                if stride["place_m"] is not None and walk["start_m"] is not None:
-                    plates_m = stride["place_m"] - walk["start_m"] + reach_m
-                mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
-                add(mud, walk, method, stride, plates_m=plates_m, trial=walk["trial"])
-    for group, mud, _ in plan.soft_walks:
-        for walk in walks_of(plan, entries, group):
-            for method, strides in walk["strides"].items():
-                for stride in strides[1:]:
-                    add(mud, walk, method, stride, group)
+                keys: Row = {"mud": group, "method": method}
+                mud = soft.get(group)
+                if mud is None:
+                    plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
+                    if stride["place_m"] is not None and walk["start_m"] is not None:
+                        plates_m = stride["place_m"] - walk["start_m"] + reach_m
+                    mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
+                    keys |= {"mud": mud, "plates_m": plates_m, "trial": walk["trial"]}
+                elif index == 0:
+                    continue
+                known = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})
+                rows += compared_rows(stride, known, **keys)
     return compared_frame(rows)
 
 
-def _report_of(
-    plan: WalkTrials,
-    entries: Mapping[str, Entry],
-    strides: DataFrame,
-    configuration: Configuration,
-    left_out: Mapping[str, Entry],
-) -> Report:
-    method, certain = configured_method(configuration.estimation), strides[strides["mud"] != ""]
+def _report_of(plan: WalkTrials, walks: Walks, strides: DataFrame, method: str) -> Report:
+    certain = strides[strides["mud"] != ""]
     uncertain = strides[(strides["mud"] == "") & (strides["method"] == method)]
     return {
         "experiment": "walk",
         "muds": mud_summaries(certain, dict(plan.muds), method, median),
-        "soft": [{"mud": mud, "depths": _soft_depths(plan, entries, mud, certain)} for mud in plan.soft],
+        "soft": [{"mud": mud, "depths": _soft_depths(plan, walks, mud, certain)} for mud in plan.soft],
         "errors": error_table(certain, "walking"),
-        "beside_paper": _findings(plan, entries, certain),
-        "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
+        "beside_paper": _findings(plan, walks, certain),
+        "without_pose": sum(walk["start_m"] is None for walk in walks[plan.over]),
         "at_a_border": len(_k_s_of(uncertain)),  # strides that belong to no mud
-        "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
-        "left_out": left_out,
     }
 
 
-def _soft_depths(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: DataFrame) -> list[dict[str, Any]]:
+def _soft_depths(plan: WalkTrials, walks: Walks, mud: str, strides: DataFrame) -> list[dict[str, Any]]:
     """Gather k_s by depth and method, with the load cell's."""
-    groups = [(name, depth_m) for name, own, depth_m in plan.soft_walks if own == mud]
     return [
         {
             "depth_cm": 100.0 * depth_m,
-            "k_s": {method: gather_coefficient(k_s) for method, k_s in _k_s_of(own).groupby("method", sort=False)},
-            "truth": average_truth(own, median).get("k_s"),
-            "thrust_n": _thrust_n(walks_of(plan, entries, name)),  # of both flippers
+            "k_s": {method: gather_coefficient(k_s) for method, k_s in _k_s_of(rows).groupby("method", sort=False)},
+            "truth": average_truth(rows, median).get("k_s"),
+            "thrust_n": _thrust_n(walks[name]),  # of both flippers
         }
-        for name, depth_m in groups
-        if len(own := strides[strides["mud"] == name])
+        for name, own, depth_m in plan.soft_walks
+        if own == mud and len(rows := strides[strides["mud"] == name])
     ]
 
 
@@ -204,7 +189,7 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
     return fmean(means_n) if means_n else None
 
 
-def _findings(plan: WalkTrials, entries: Mapping[str, Entry], strides: DataFrame) -> list[dict[str, Any]]:
+def _findings(plan: WalkTrials, walks: Walks, strides: DataFrame) -> list[dict[str, Any]]:
     """Pair each finding in the paper's text with ours, by its law with a known surface."""
     over = "k_s over the load cell's"
     rows: list[tuple[str, str, float | None]] = [
@@ -213,10 +198,9 @@ def _findings(plan: WalkTrials, entries: Mapping[str, Entry], strides: DataFrame
     for mud in plan.soft:
         at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
         text_3, text_5 = mud_text(at_3), mud_text(at_5)
-        cell = average_truth(strides[strides["mud"] == at_3], median).get(
-            "k_s"
-        )  # the paper's load cell measured at 3 cm
-        thrust_n = _thrust_n(walks_of(plan, entries, at_5))
+        # the paper's load cell measured at 3 cm
+        cell = average_truth(strides[strides["mud"] == at_3], median).get("k_s")
+        thrust_n = _thrust_n(walks[at_5])
         rows += [
             (f"{over} at 3 cm, {text_3}", "close to 1", _ratio(strides, at_3, cell=cell)),
             (f"{over} at 3 cm, {text_5}", "0.5", _ratio(strides, at_5, cell=cell)),
@@ -238,26 +222,21 @@ def _ratio(strides: DataFrame, mud: str, method: str = KNOWN, cell: float | None
 
 
 def _figures(
-    plan: WalkTrials,
-    entries: Mapping[str, Entry],
-    strides: DataFrame,
-    report: Report,
-    sections: Mapping[str, str],
-    reach_m: float,
+    plan: WalkTrials, walks: Walks, strides: DataFrame, soft: Sequence[Mapping[str, Any]], reach_m: float
 ) -> Iterator[Figure]:
     located = strides[strides["plates_m"].notna()]
-    for walk in walks_of(plan, entries):
+    for walk in walks[plan.over]:
         draw = partial(draw_walk_over, plan, walk, located, reach_m)
         yield Figure(f"figure6_trial{walk['trial']}", FIGURE_6.format(walk["trial"], plan.flipper), draw, TRACK)
-    for soft in report["soft"]:
-        own = {
-            100.0 * depth_m: walks_of(plan, entries, name)
-            for name, mud, depth_m in plan.soft_walks
-            if mud == soft["mud"]
-        }
-        if soft["depths"]:
-            draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in own.items() if made})
-            yield Figure(f"figure7_{file_name(soft['mud'])}", FIGURE_7, draw, sections[soft["mud"]])
+    for each in soft:
+        own = {100.0 * depth_m: walks[name] for name, mud, depth_m in plan.soft_walks if mud == each["mud"]}
+        if each["depths"]:
+            draw = partial(draw_soft, each, {depth_cm: made for depth_cm, made in own.items() if made})
+            yield Figure(f"figure7_{file_name(each['mud'])}", FIGURE_7, draw, _soft_section(each))
+
+
+def _soft_section(soft: Mapping[str, Any]) -> str:
+    return f"Soft mud, {mud_text(soft['mud'])}"
 
 
 def _explanation(report: Report, configuration: Configuration) -> str:

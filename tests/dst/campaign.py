@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
 from functools import partial
 
-from experiments.study.workers import LocalWorkers
+from experiments.study.workers import run_locally
 from tests.dst.drawing import SHARED, Style, draw_scenario
 from tests.dst.run import Outcome, run_scenario
 from tests.dst.scenario import describe
@@ -52,7 +52,7 @@ def run_campaign(first: int, last: int, workers: int, style: Style | None = None
     """Run the seeds in processes of their own, until all are done or Ctrl-C; return the outcomes in their order."""
     begun_s, outcomes = time.monotonic(), list[Outcome]()
     trials = [partial(run_block, *block, style) for block in blocks(first, last)]
-    with suppress(KeyboardInterrupt), closing(LocalWorkers(workers).results(trials)) as ended:
+    with suppress(KeyboardInterrupt), closing(run_locally(trials, workers)) as ended:
         for _, block in ended:
             outcomes += block
             broken = sum(bool(each.problem) for each in outcomes)

@@ -23,7 +23,7 @@ from experiments.study.notebook import Entry, Notebook
 from experiments.study.result import Result
 from experiments.trials.coefficient_page import COMPARISON
 from experiments.trials.estimation_methods import DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, MeasuredTrials, PlannedTrial, conduct_trials
 from experiments.trials.stride_profile import profile_from
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
@@ -71,7 +71,8 @@ def reported(
 ) -> Result:
     configuration = bench_configuration()
     configuration = replace(configuration, estimation=replace(configuration.estimation, method=method))
-    return result_of(SETTINGS, trials_by_mud(muds, entries or measured()[0]), configuration, truth, {})
+    trials = MeasuredTrials(configuration, entries or measured()[0], {})
+    return result_of(SETTINGS, muds, trials, truth)
 
 
 def report(*arguments: Any, **options: Any) -> Report:

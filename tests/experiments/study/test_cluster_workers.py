@@ -11,14 +11,14 @@ import pytest
 
 from experiments.study.notebook import Entry
 from experiments.study.provenance import PACKAGES
-from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
+from experiments.study.workers import WorkersError, run_locally, run_parallel
 from experiments.trackway.simulated_walk import walk_in_mud
 from tests.folders import ROOT
 
 pytest.importorskip("distributed", reason="needs the extra cluster")
 
 from experiments.study import cluster_workers  # noqa: E402 - it imports distributed
-from experiments.study.cluster_workers import ClusterWorkers  # noqa: E402
+from experiments.study.cluster_workers import run_on_cluster  # noqa: E402
 from tests.experiments.study.running_cluster import running_cluster  # noqa: E402
 
 WALKS = [partial(walk_in_mud, 2800.0, seed, 0.02, count=1) for seed in range(1, 4)]
@@ -36,7 +36,7 @@ def closed_clients() -> None:
 
 @pytest.fixture(scope="module")
 def digits() -> list[Entry]:
-    return run_parallel(WALKS, ignore, LocalWorkers(1))
+    return run_parallel(WALKS, ignore, partial(run_locally, processes=1))
 
 
 def ignore(done: int, total: int) -> None:
@@ -44,7 +44,7 @@ def ignore(done: int, total: int) -> None:
 
 
 def test_two_local_workers_find_the_digits_of_one(digits: list[Entry]) -> None:
-    assert run_parallel(WALKS, ignore, LocalWorkers(2)) == digits
+    assert run_parallel(WALKS, ignore, partial(run_locally, processes=2)) == digits
 
 
 def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
@@ -57,7 +57,7 @@ def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
             if shown[-1][0] == 0:
                 cluster.workers[0].kill()
 
-        workers = ClusterWorkers(cluster.address)
+        workers = partial(run_on_cluster, address=cluster.address)
         assert run_parallel(WALKS, lambda *count: shown.append(count), workers, kill_one_after_the_first) == digits
     assert shown == [(done, len(WALKS)) for done in range(len(WALKS) + 1)]
 
@@ -71,7 +71,7 @@ def test_a_lost_cluster_is_one_message_after_the_results_that_it_gave(tmp_path: 
             cluster.end()
 
         with pytest.raises(WorkersError, match=f"the cluster at {cluster.address} was lost"):
-            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address), lose)
+            run_parallel(WALKS, ignore, partial(run_on_cluster, address=cluster.address), lose)
     assert kept == digits[: len(kept)]
 
 
@@ -79,7 +79,7 @@ def test_a_cluster_that_cannot_be_reached_is_one_message(monkeypatch: pytest.Mon
     monkeypatch.setattr(cluster_workers, "CONNECT_S", 0.5)
     for address in ("tcp://127.0.0.1:1", "127.0.0.1:1", "fog://127.0.0.1:1", "nowhere"):
         with pytest.raises(WorkersError, match=f"no cluster answers at {address}"):
-            run_parallel(WALKS, ignore, ClusterWorkers(address))
+            run_parallel(WALKS, ignore, partial(run_on_cluster, address=address))
 
 
 def test_a_cluster_without_workers_of_these_sources_is_refused_before_the_first_trial(
@@ -93,10 +93,10 @@ def test_a_cluster_without_workers_of_these_sources_is_refused_before_the_first_
     with running_cluster(tmp_path) as cluster:
         monkeypatch.setattr(cluster_workers, "CONNECT_S", 1.0)
         with pytest.raises(WorkersError, match="has no workers: start some with 'dask worker tcp://"):
-            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address))
+            run_parallel(WALKS, ignore, partial(run_on_cluster, address=cluster.address))
         monkeypatch.undo()
         cluster.add_worker({"PYTHONPATH": str(other)}, other)
         cluster.wait_for_workers()
         with pytest.raises(WorkersError, match="install the same version of mudskipper on all workers") as refused:
-            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address))
+            run_parallel(WALKS, ignore, partial(run_on_cluster, address=cluster.address))
     assert str(refused.value).count("sources") == 2

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
+from experiments.study.workers import WorkersError, run_locally, run_parallel
 from tests.waiting import wait_until
+
+ONE, TWO = (partial(run_locally, processes=number) for number in (1, 2))
 
 
 def late(seconds: float) -> float:
@@ -35,28 +37,33 @@ def ignore(done: int, total: int) -> None:
 
 def test_outcomes_come_in_the_order_of_the_trials_not_of_their_ends() -> None:
     waits = [0.2, 0.0, 0.05, 0.0]
-    assert run_parallel([partial(late, wait) for wait in waits], ignore, LocalWorkers(2)) == waits
+    assert run_parallel([partial(late, wait) for wait in waits], ignore, TWO) == waits
 
 
 def test_progress_counts_every_trial() -> None:
     shown = list[tuple[int, int]]()
-    run_parallel([partial(late, 0.0)] * 3, lambda done, total: shown.append((done, total)), LocalWorkers(1))
+    run_parallel([partial(late, 0.0)] * 3, lambda done, total: shown.append((done, total)), ONE)
     assert shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 
 def test_trials_run_in_other_processes() -> None:
-    assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, LocalWorkers(1))
+    assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, ONE)
 
 
 def test_an_exception_of_a_trial_reaches_the_caller() -> None:
     with pytest.raises(ValueError, match="cannot be"):
-        run_parallel([partial(broken), partial(late, 0.0)], ignore, LocalWorkers(1))
+        run_parallel([partial(broken), partial(late, 0.0)], ignore, ONE)
 
 
 def test_a_long_trial_is_looked_at_meanwhile(tmp_path: Path) -> None:
     """The trial ends only after it was looked at twice."""
     looks = [tmp_path / "first", tmp_path / "second"]
-    run_parallel([partial(wait_for_file, looks[1])], ignore, LocalWorkers(1, lambda: next_missing(looks).touch()))
+    watched = partial(run_locally, processes=1, meanwhile=lambda: next_missing(looks).touch())
+    run_parallel(
+        [partial(wait_for_file, looks[1])],
+        ignore,
+        watched,
+    )
 
 
 def next_missing(paths: list[Path]) -> Path:
@@ -71,13 +78,13 @@ def test_the_trials_of_a_lost_worker_are_repeated(tmp_path: Path) -> None:
     marks = [tmp_path / str(number) for number in range(4)]
     kept: list[int] = []
     trials = [partial(killed_at_first, mark) for mark in marks]
-    results = run_parallel(trials, ignore, LocalWorkers(2), lambda index, result: kept.append(index))
+    results = run_parallel(trials, ignore, TWO, lambda index, result: kept.append(index))
     assert results == ["done"] * 4 and sorted(kept) == [0, 1, 2, 3]
 
 
 def test_a_trial_that_ends_every_worker_is_given_up_with_a_message() -> None:
     with pytest.raises(WorkersError, match="3 worker processes in a row"):
-        run_parallel([os.getpid, kill_this_process], ignore, LocalWorkers(1))
+        run_parallel([os.getpid, kill_this_process], ignore, ONE)
 
 
 def kill_this_process() -> None:

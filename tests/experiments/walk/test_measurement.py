@@ -16,10 +16,10 @@ from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.studies.walk import walking_bench
 from experiments.study.notebook import Entry, Notebook
-from experiments.trackway.bench import Muds
+from experiments.trackway.bench import Muds, reach_of
 from experiments.trials.coefficient_page import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, MeasuredTrials, conduct_trials
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, WalkTrials, measure, monitor_advance, require_mud
 from experiments.walk.report import Report, compared_strides, result_of, walks_of
@@ -45,7 +45,7 @@ def bench_of(folder: Path, plan: WalkTrials) -> Bench:
 
 
 def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
-    return dict(result_of(plan, measured(), CONFIGURATION, truth, {}).summary)
+    return dict(result_of(plan, MeasuredTrials(CONFIGURATION, measured(), {}), truth).summary)
 
 
 # the plan
@@ -92,7 +92,8 @@ def test_every_walk_is_in_the_notebook_with_all_methods() -> None:
 
 def test_the_robot_walks_past_the_last_mud_and_a_stride_belongs_to_the_mud_in_which_its_plate_stays() -> None:
     """No stride goes down more than a step past the end. A stance is 12 cm long; in soft mud half of it is slip."""
-    strides = compared_strides(SHORT, measured(), CONFIGURATION, None).dropna(subset="plates_m")
+    walks = walks_of(SHORT, measured())
+    strides = compared_strides(SHORT, walks, reach_of(CONFIGURATION), None).dropna(subset="plates_m")
     located = strides[(strides["method"] == DEFAULT) & (strides["coefficient"] == "k_s")]
     positions_m = located["plates_m"].tolist()
     assert positions_m == sorted(positions_m) and 0.0 < positions_m[0] < 0.1
@@ -140,7 +141,7 @@ def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
-    result = result_of(SHORT, measured(), CONFIGURATION, None, {})
+    result = result_of(SHORT, MeasuredTrials(CONFIGURATION, measured(), {}), None)
     assert result.json()["experiment"] == "walk"
     assert [table.name for table in result.tables] == ["muds", "errors", "findings"]
     assert [(figure.name, len(figure.draw().axes)) for figure in result.figures] == [
@@ -183,7 +184,8 @@ def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(
     entry = walk_once(tmp_path, TINY.muds, blind_from_s=0.0)
     assert [remark for remark in entry["remarks"] if "no pose arrives" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
-    reported = result_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None, {}).summary
+    entries = {"walk/1": json.loads(json.dumps(entry))}
+    reported = result_of(TINY, MeasuredTrials(CONFIGURATION, entries, {}), None).summary
     assert reported["without_pose"] == 1
     assert len(reported["muds"][0]["k_p"].trials) == 2
 
@@ -202,9 +204,9 @@ def test_a_pose_that_is_lost_during_a_walk_makes_it_invalid(tmp_path: Path) -> N
 def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> None:
     plan = replace(SHORT, muds=(("a", 0.2), ("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
-    spread = compared_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
+    walks = walks_of(plan, {"walk/1": entry, "walk/2": entry})  # one is planned
+    spread = compared_strides(plan, walks, 0.06, None)
     assert spread["mud"].tolist() == [mud for mud in ("a", "b", "b", "b") for _ in COEFFICIENTS]
-    assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
 
 
 # the advance of a walk
