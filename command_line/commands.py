@@ -34,6 +34,7 @@ COMMANDS: Mapping[str, Command] = {
     "status": ("operation.operation.status", "Print the state of the robot."),
     "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
+    "run": ("operation.run.run", "Walk by a control law of your own: a function in a file, called once a stride."),
     "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
     "stop": ("operation.confirmed_stop.stop", "End the walk, raise the flippers and hold the pose."),
     "joy": ("operation.joy.joy", "Drive the robot by a gamepad or keys: it stops when a button is released."),

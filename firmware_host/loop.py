@@ -17,6 +17,7 @@ from control.faults import OVERRULED_BY_FORCE, Fault, Reaction
 from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
+from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import NEVER_S, BodyPose, DriveState, DriveStates, GaitTarget, Torques, same_for_all
 from drivers.drives import Drives
@@ -286,9 +287,12 @@ class Loop:
             self.pending_request = request
         return None
 
-    def change_depth(self, depth_m: float, now_s: float, by: str) -> None:
-        """Fix the depth of the present walk, also one that adapted; a stride that has begun keeps its own."""
-        self.events.report(now_s, f"depth {depth_m:.4f} m by {by}")
+    def change_strides(self, depth_m: float, gait: GaitParameters | None, now_s: float, by: str) -> None:
+        """Fix depth and gait of the present walk, also of one that adapted; a stride that has begun keeps its own."""
+        sweep = f", sweep {gait.sweep_angle_deg:g} degrees" if gait else ""
+        self.events.report(now_s, f"depth {depth_m:.4f} m{sweep} by {by}")
+        if gait:
+            self.controller.gait.next_parameters = gait
         self.controller.order = self.controller.order._replace(depth_m=depth_m, adaptive=False, depths_m=())
         self.controller.gait.next_depth_m = depth_m
 

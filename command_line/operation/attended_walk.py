@@ -1,11 +1,12 @@
 """Runs an attended walk: the robot walks for as long as this program renews its lease.
 
 Ctrl-C stops the robot and waits until it holds. If this program dies or hangs for longer than its lease, the daemon
-stops the robot.
+stops the robot. A control law (run.py) may order each stride.
 """
 
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from command_line import exit_codes
@@ -16,14 +17,26 @@ from operator_client.status_client import CallRefusedError, StatusClient
 
 LEASE_S = 1.0
 RENEWAL_S = 0.2
+POLL_S = 0.03  # for strides that have closed, from which a law orders the next one
 MOVING = ("walking", "stopping", "damping")
 
 
-def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
+Law = Callable[[StatusClient], None]
+
+
+class LawError(Exception):
+    """A control law cannot go on; the message says why."""
+
+
+def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law | None = None) -> int:
     """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     try:
-        report, status = _renew(client, as_json), exit_codes.OK
+        report, status = _renew(client, as_json, law), exit_codes.OK
+    except LawError as problem:
+        complain(f"{problem}; the robot stops")
+        client.call("stop")
+        report, status = _renew(client, as_json), exit_codes.REFUSED
     except KeyboardInterrupt:
         client.call("stop")
         report, status = _renew(client, as_json), exit_codes.INTERRUPTED
@@ -31,8 +44,8 @@ def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
     return _conclude(report, as_json, status)
 
 
-def _renew(client: StatusClient, as_json: bool) -> dict[str, Any]:
-    """Renew the lease until the walk ends, and return the last status."""
+def _renew(client: StatusClient, as_json: bool, law: Law | None = None) -> dict[str, Any]:
+    """Renew the lease until the walk ends, and return the last status. A law that takes too long loses the lease."""
     line = LiveLine(silent=as_json)
     while True:
         report: dict[str, Any] = client.call("status")
@@ -46,7 +59,9 @@ def _renew(client: StatusClient, as_json: bool) -> dict[str, Any]:
             if client.call("status")["mode"] in MOVING:
                 line.end()
                 raise
-        time.sleep(RENEWAL_S)
+        if law:
+            law(client)
+        time.sleep(POLL_S if law else RENEWAL_S)
 
 
 def _conclude(report: dict[str, Any], as_json: bool, status: int) -> int:

@@ -7,6 +7,7 @@ the holder of the lease, if there is one; methods that end a motion are not.
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from math import degrees, inf
 from typing import Any
 
@@ -31,7 +32,13 @@ from firmware_host.operator.reports import (
 from firmware_host.operator.trial_calls import TrialCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rpc import RefusedError
-from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
+from firmware_host.sockets.socket_methods import (
+    FAULTS_PER_ANSWER,
+    GAIT_UNITS,
+    METHODS,
+    PIECES_PER_ANSWER,
+    STRIDES_PER_ANSWER,
+)
 from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
@@ -77,7 +84,8 @@ class OperatorCalls:
             "check": lambda params, caller: arming_checks(self._loop, self._warnings),
             "arm": self._as_holder(lambda params, caller: self._request(caller, Request.ARM, forced=params["force"])),
             "walk": self._as_holder(self.walk),
-            "depth": self._as_holder(self.depth),
+            "depth": self._as_holder(self.change_strides),
+            "stride": self._as_holder(self.change_strides),
             "move": self._as_holder(self.move),
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
@@ -192,13 +200,24 @@ class OperatorCalls:
                 f" {100.0 * deepest_m:g} cm, which is adaptation.max_depth_m in the configuration"
             )
 
-    def depth(self, params: dict[str, Any], caller: Caller) -> str:
+    def change_strides(self, params: dict[str, Any], caller: Caller) -> str:
+        """Set the depth of the present walk, and its gait where that is given."""
         self._require_depth(params["depth_m"])
         if self._loop.mode is not Mode.WALKING:
             raise RefusedError(
                 f"cannot change the depth in mode {self._loop.mode.name.lower()}: the robot does not walk"
             )
-        self._loop.change_depth(params["depth_m"], self._clock(), str(caller))
+        given = {key: params[key] for key in GAIT_UNITS if params.get(key) is not None}
+        gait = replace(self._loop.controller.gait.next_parameters, **given)
+        configuration, sweep_deg = self._loop.configuration, gait.sweep_angle_deg
+        widest_deg = min(-configuration.limits.sweep_min_deg, configuration.limits.sweep_max_deg)
+        if sweep_deg > widest_deg:
+            raise RefusedError(f"sweep_angle_deg = {sweep_deg:g}: must be at most {widest_deg:g}, the joint's range")
+        deepest_m = configuration.geometry.deepest_m(sweep_deg)
+        if params["depth_m"] > deepest_m:
+            reach = f"must be at most {deepest_m:.4f} for a sweep of ±{sweep_deg:g} degrees"
+            raise RefusedError(f"depth_m = {params['depth_m']:g}: {reach}")
+        self._loop.change_strides(params["depth_m"], gait if given else None, self._clock(), str(caller))
         return "accepted"
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:

@@ -7,9 +7,10 @@ that come from the configuration are named here and are checked by the method it
 from collections.abc import Mapping
 from enum import IntEnum, StrEnum
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 from control.bounds import Bounds
+from control.parameters.gait_parameters import GaitParameters
 from control.records import JOINTS
 from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
@@ -160,6 +161,18 @@ DEPTH = Parameter(
 DEPTHS = DEPTH._replace(
     name="depths_m", type=Type.NUMBERS, meaning="fixed depths of the strides in turn, in place of depth_m"
 )
+FIXED_DEPTH = DEPTH._replace(meaning="depth of every stride", null_is_default=False, required=True)
+GAIT_UNITS = {
+    "sweep_angle_deg": "degrees",
+    "insertion_speed_m_s": "m/s",
+    "stance_speed_m_s": "m/s",
+    "extraction_speed_m_s": "m/s",
+}
+GAIT_HINTS = get_type_hints(GaitParameters, include_extras=True)
+GAIT = tuple(
+    Parameter(key, Type.NUMBER, f"as gait.{key}; without it, as before", unit, GAIT_HINTS[key].__metadata__[0])
+    for key, unit in GAIT_UNITS.items()
+)
 FAILURE = (
     Parameter("component", Type.TEXT, 'what fails; "all" with kind "ok"', required=True),
     Parameter("kind", Type.TEXT, 'how it fails; "ok" ends the failure', required=True),
@@ -290,7 +303,13 @@ METHODS: dict[str, SocketMethod] = {
     "depth": SocketMethod(
         Level.DRIVE,
         "Fix the depth of the present walk, from the next stride on, or from the second if that one is being chosen.",
-        (DEPTH._replace(meaning="depth of every stride", null_is_default=False, required=True), *LEASE),
+        (FIXED_DEPTH, *LEASE),
+    ),
+    "stride": SocketMethod(
+        Level.DRIVE,
+        "Fix depth and gait of the present walk, from the next stride on, or from the second one late in a swing.",
+        (FIXED_DEPTH, *GAIT, *LEASE),
+        refuses_unknown=True,
     ),
     "move": SocketMethod(
         Level.DRIVE,

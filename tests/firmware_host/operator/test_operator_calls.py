@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import nan, radians
 from typing import Any
 
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from control.faults import FaultKind
 from control.modes import Mode
 from control.rate import PERIOD_S
+from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import LONGEST_TEXT
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -108,7 +109,7 @@ def test_a_refused_request_is_not_logged(robot: Robot) -> None:
 def test_every_method_is_in_the_table_with_its_level(robot: Robot) -> None:
     assert METHODS.keys() - robot.names == {"fail", "failures"} and robot.names <= METHODS.keys()
     for_operators = {name for name, method in METHODS.items() if method.level is Level.DRIVE}
-    moving = {"arm", "walk", "depth", "move", "clear", "lease", "release"}
+    moving = {"arm", "walk", "depth", "stride", "move", "clear", "lease", "release"}
     assert for_operators == moving | {"trial_set", "note", "mark", "reset_timing", "fail"}
 
 
@@ -399,3 +400,20 @@ def test_a_walk_takes_several_depths_in_turn_until_one_is_fixed(armed: Robot) ->
     armed.ask("depth", depth_m=0.025)
     armed.steps.run_until(lambda: loop.target.stride == 6, 20.0)
     assert loop.stride_depth_m == 0.025
+
+
+def test_strides_to_come_have_the_ordered_sweep_and_speeds_within_the_joints_reach(armed: Robot) -> None:
+    loop = armed.steps.loop
+    armed.ask("walk", depth_m=0.03)
+    armed.steps.run_until(lambda: loop.target.stride == 1, 20.0)
+    too_wide = (("sweep_angle_deg", 59.0), ("sweep_angle_deg", 61.0))  # the first does not reach 3 cm
+    for key, value in (*too_wide, ("stance_speed_m_s", 0.0), ("sweep", 20.0)):
+        with pytest.raises(RefusedError):
+            armed.ask("stride", depth_m=0.03, **{key: value})  # type: ignore[arg-type]
+    armed.ask("stride", depth_m=0.02, sweep_angle_deg=20.0, stance_speed_m_s=0.3)
+    armed.steps.run_until(lambda: loop.target.stride == 2 and loop.target.phase is Phase.STANCE, 20.0)
+    assert loop.stride_depth_m == 0.02
+    widest_rad = loop.target.sweep_rad
+    armed.steps.run_until(lambda: loop.target.phase is Phase.EXTRACTION, 20.0)
+    assert widest_rad == pytest.approx(radians(20.0), abs=0.01) and loop.target.sweep_rad == -radians(20.0)
+    assert loop.controller.gait.parameters.sweep_angle_deg == 30.0  # of the next walk

@@ -1,0 +1,121 @@
+"""A user's control law orders the strides of an attended walk, and a law that fails stops the robot."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.errors import CommandError
+from command_line.operation import attended_walk, run
+from operator_client.status_client import CallRefusedError, StatusClient
+from tests.folders import ROOT
+
+LAWS = ROOT / "examples" / "laws"
+MODE = {"fault": None, "notice": "", "stride": 0, "phase": "swing", "depth_m": 0.0, "body_x_m": 0.0}
+
+
+class WalkOfTwoStrides(StatusClient):
+    """A daemon whose robot closes a stride of both flippers with every second status, and stops when it is told to."""
+
+    def __init__(self, _: Path, refusal: str = "") -> None:
+        self.orders: list[dict[str, Any]] = []
+        self._refusal, self._asked, self._stopped = refusal, 0, False
+
+    def call(self, method: str, **params: Any) -> Any:
+        if method == "status":
+            self._asked += 1
+            rests = self._stopped or self._asked > 8
+            return MODE | {"mode": "hold" if rests else "walking", "strides_closed": 10}
+        if method == "strides":
+            closed = 10 + 2 * min(2, self._asked // 2)
+            return [{"flipper": "left", "number": number} for number in range(params["since"], closed)]
+        if method == "stride":
+            if self._refusal:
+                raise CallRefusedError(self._refusal)
+            self.orders.append(params)
+        self._stopped = self._stopped or method == "stop"
+        return "accepted"
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def daemon(monkeypatch: pytest.MonkeyPatch) -> WalkOfTwoStrides:
+    client = WalkOfTwoStrides(Path())
+    monkeypatch.setattr(attended_walk, "POLL_S", 0.0)
+    monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
+    monkeypatch.setattr("command_line.operation.operation.StatusClient", lambda socket: client)
+    return client
+
+
+def law(folder: Path, body: str) -> str:
+    path = folder / "law.py"
+    path.write_text(f"import math\ndef law(strides):\n    {body}\n", encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("body", "orders"),
+    [
+        ("return 0.001 * strides[0]['number']", [{"depth_m": 0.01}, {"depth_m": 0.012}]),
+        ("return {'depth_m': 0.03, 'sweep_angle_deg': 20.0}", [{"depth_m": 0.03, "sweep_angle_deg": 20.0}] * 2),
+        ("return None", []),
+    ],
+    ids=["a depth", "a depth and a sweep", "as before"],
+)
+def test_a_law_is_called_once_for_each_stride_that_closed(
+    daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
+) -> None:
+    assert run.run(law(tmp_path, body), socket=tmp_path) == exit_codes.OK
+    assert daemon.orders == list(orders)
+
+
+@pytest.mark.parametrize(
+    ("body", "named"),
+    [
+        ("return 1 / 0", ("ZeroDivisionError", "line 3")),
+        ("return 'deep'", ("'deep'",)),
+        ("return {'depth_m': 0.03, 'method': 'disarm'}", ("'method'",)),
+    ],
+)
+def test_a_law_that_fails_stops_the_robot_and_is_named(
+    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str], body: str, named: Sequence[str]
+) -> None:
+    assert run.run(law(tmp_path, body), socket=tmp_path) == exit_codes.REFUSED
+    printed = capsys.readouterr()
+    assert printed.out.splitlines()[-1] == "hold" and all(name in printed.err for name in named)
+
+
+def test_an_order_that_the_daemon_refuses_stops_the_robot(
+    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    daemon._refusal = "depth_m = 9: too deep"
+    assert run.run(law(tmp_path, "return 9.0"), socket=tmp_path) == exit_codes.REFUSED
+    assert daemon._refusal in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", ["", "import nothing_of_this_name", "law = 3", "def other(strides): pass"])
+def test_a_file_without_a_law_is_refused_before_the_robot_walks(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "law.py"
+    path.write_text(content, encoding="utf-8")
+    for target in (str(path), f"{path}:absent", str(tmp_path / "absent.py")):
+        with pytest.raises(CommandError) as refused:
+            run.run(target, socket=tmp_path)
+        assert refused.value.status == exit_codes.USAGE
+
+
+@pytest.mark.parametrize("path", sorted(LAWS.glob("*.py")), ids=lambda path: path.stem)
+def test_the_examples_order_depths_that_the_robot_reaches(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", (LAWS / "paper_rule.py").open())  # a file that is ready, with + and - in it
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 40
+    example = run.load_law(str(path))
+    for k_e, step_m in ((3e6, 0.03), (3e5, 0.001), (3e7, 0.0)):
+        stride = {"k_e": {"value": k_e, "valid": True}, "step_m": step_m}
+        order = run.order_of(example, [stride, stride])
+        assert order is not None and 0.01 <= order["depth_m"] <= 0.05
