@@ -8,7 +8,7 @@ prints letters or dashes in place of a number, or stays at the last count of its
 
 import re
 from collections.abc import Sequence
-from math import isfinite
+from math import isfinite, nan
 from typing import NamedTuple
 
 GRAVITY_M_S2 = 9.80665
@@ -41,10 +41,9 @@ OVERLOADED = re.compile(
 )
 
 
-class Reading(NamedTuple):
-    value: float  # in the unit of the line, or in the configured one
+class LineReading(NamedTuple):
+    value: float  # in the unit of the line, or in the configured one; NaN where the cell is overloaded
     unit: str = ""  # in lower case; empty where the line has none
-    overloaded: bool = False
 
 
 class LineFormat:
@@ -65,14 +64,14 @@ class LineFormat:
         except re.error as problem:
             raise ValueError(f"format {name!r}: not a regular expression: {problem}") from problem
 
-    def decode(self, line: bytes) -> Reading | None:
+    def decode(self, line: bytes) -> LineReading | None:
         """Return the reading, or None where the line does not have this format."""
         text = printable(line)
         if text is None:
             return None
         match = self._pattern.fullmatch(_column(text, self._column) if self._column else text)
         if match is None:
-            return Reading(float("nan"), overloaded=True) if OVERLOADED.fullmatch(text) else None
+            return LineReading(nan) if OVERLOADED.fullmatch(text) else None
         try:
             value = float(match["value"].replace(" ", ""))
         except ValueError:  # the user's pattern may match other text
@@ -82,7 +81,7 @@ class LineFormat:
         unit = (match.groupdict().get("unit") or "").lower()
         unit = COUNTS if unit == "count" else unit
         at_end = unit in ("", COUNTS) and value in CONVERTER_ENDS
-        return Reading(value, unit, at_end)
+        return LineReading(nan if at_end else value, unit)
 
 
 def _column(text: str, column: int) -> str:

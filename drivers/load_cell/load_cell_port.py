@@ -1,19 +1,18 @@
 """A load cell's amplifier on a serial port: samples of force, also after the adapter was unplugged.
 
-The amplifier sends lines of text at its own rate. Reading never waits. A malformed line is counted and stored for
+The amplifier sends lines of text at its own rate. LineReading never waits. A malformed line is counted and stored for
 display, and an unplugged adapter is opened again as soon as it is back (serial_line.py).
 """
 
-from math import nan
+from math import isnan
 from typing import NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
-from drivers.load_cell.line_formats import NEWTONS, LineFormat, Reading, printable
+from drivers.load_cell.line_formats import NEWTONS, LineFormat, LineReading, printable
 from drivers.load_cell.sample_clock import SampledLine
-from drivers.serial.serial_line import Arrivals
 
 
-class Sample(NamedTuple):
+class ForceSample(NamedTuple):
     stamp_s: float
     force_n: float  # NaN where overloaded
     overloaded: bool = False
@@ -30,10 +29,10 @@ class LoadCellPort:
         self.line = SampledLine(path, baud)
 
     @property
-    def arrivals(self) -> Arrivals:
-        return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
+    def readable_fraction(self) -> float:
+        return self.line.readable_fraction(lambda line: self.line_format.decode(line) is not None)
 
-    def read(self, now_s: float) -> list[Sample]:
+    def read(self, now_s: float) -> list[ForceSample]:
         """Return all samples that have arrived, oldest first; never waits."""
         self.line.reopen(now_s)
         samples = []
@@ -43,14 +42,13 @@ class LoadCellPort:
             if reading is None:
                 self.malformed_lines += 1
                 self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
-            elif reading.overloaded:
-                self.overloads += 1
-                samples.append(Sample(stamp_s, nan, overloaded=True))
-            else:
-                samples.append(Sample(stamp_s, self.calibration.force_n(self._in_unit(reading))))
+                continue
+            force_n = self.calibration.force_n(self._in_unit(reading))
+            samples.append(ForceSample(stamp_s, force_n, isnan(force_n)))
+            self.overloads += samples[-1].overloaded
         return samples
 
-    def _in_unit(self, reading: Reading) -> float:
+    def _in_unit(self, reading: LineReading) -> float:
         """Convert a reading whose line names another unit than the calibration."""
         own, wanted = reading.unit, self.calibration.unit.lower()
         if own == wanted or own not in NEWTONS or wanted not in NEWTONS:

@@ -6,19 +6,17 @@ is opened again as soon as it is back.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds
 from drivers.load_cell.sample_clock import SampledLine
 from drivers.serial.encoder_counts import EncoderCounts
-from drivers.serial.serial_line import Arrivals
 
 
 @dataclass(frozen=True)
 class StageEncoderSettings:
     path: str
-    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)]  # its sign is found from the stroke
-    baud: Annotated[int, Bounds(300, 4_000_000)] = 115_200
+    metres_per_count: float  # its sign is found from the stroke
+    baud: int = 115_200
     label: str = ""  # with which each line begins
 
 
@@ -47,8 +45,8 @@ class StageEncoder:
         return "" if self.line.problem is None else self.line.problem.why
 
     @property
-    def arrivals(self) -> Arrivals:
-        return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
+    def readable_fraction(self) -> float:
+        return self.line.readable_fraction(lambda line: self.counts.decode(line) is not None)
 
     def silent_for_s(self, now_s: float) -> float:
         """Return for how long no count has arrived."""

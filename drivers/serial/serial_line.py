@@ -14,7 +14,7 @@ import select
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 from control.records import NEVER_S
 
@@ -24,14 +24,6 @@ MOST_BYTES_PER_READ = 4096  # the buffer of a tty
 RECENT_LINES = 40  # by which the format and the baud rate are checked
 GONE = select.POLLHUP | select.POLLERR | select.POLLNVAL
 LINE_ENDS = re.compile(rb"[\r\n]+")
-
-
-class Arrivals(NamedTuple):
-    """The quality of the recent lines, which shows a wrong format or baud rate."""
-
-    lines: int
-    readable: float  # fraction of the lines
-    text: float  # fraction of the bytes
 
 
 class SerialLineError(Exception):
@@ -71,10 +63,9 @@ class SerialLine:
     def is_there(self) -> bool:
         return self._device is not None
 
-    def arrivals(self, is_readable: Callable[[bytes], bool]) -> Arrivals:
-        lines = list(self.recent)
-        readable = sum(map(is_readable, lines))
-        return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_fraction(lines))
+    def readable_fraction(self, is_readable: Callable[[bytes], bool]) -> float:
+        """Return the fraction of the recent lines; it is small with a wrong format or baud rate."""
+        return sum(map(is_readable, self.recent)) / max(len(self.recent), 1)
 
     def read(self, now_s: float) -> list[bytes]:
         """Return all complete lines without their ends, oldest first; none where the device is gone. Never waits."""

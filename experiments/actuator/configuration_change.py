@@ -4,7 +4,7 @@ The operator sees the difference first. See experiments.actuator.file_change.py 
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from difflib import unified_diff
 from pathlib import Path
 from typing import Any
@@ -33,20 +33,22 @@ def find_target(path: Path, text: str, session: Session) -> Path:
     return path
 
 
-def apply_fits(path: Path, fits: Sequence[JointFit], session: Session) -> tuple[str, Ending]:
-    """Write the constants if the operator agrees; return a message. A failure does not cost the report."""
-    return apply_changes(path, fitted_changes(fits, session), session)
-
-
 def fitted_changes(fits: Sequence[JointFit], session: Session) -> dict[tuple[str, ...], Any]:
-    """Return the new values, and report the joints without any."""
+    """Return the new values by configuration key, and report the joints whose constant is too uncertain."""
     changes: dict[tuple[str, ...], Any] = {}
-    for fit in fits:
-        changes |= (found := changes_of(fit.numbers))
-        if not found:
-            uncertainty = fit.numbers["torque_constant_error_nm_a"] / fit.numbers["torque_constant_nm_a"]
-            name = f"{fit.numbers['joint']}: the standard error of k_t"
+    for numbers, *_ in fits:
+        joint, constant_nm_a = numbers["joint"], numbers["torque_constant_nm_a"]
+        uncertainty = numbers["torque_constant_error_nm_a"] / constant_nm_a
+        if constant_nm_a <= 0.0 or not 0.0 < uncertainty <= LARGEST_UNCERTAINTY:
+            name = f"{joint}: the standard error of k_t"
             session.operator.report(f"{name} is {100.0 * uncertainty:.1f} %; k_t is not written.")
+            continue
+        changes["drive", joint, "torque_constant_nm_a"] = round(constant_nm_a, 5)
+        for key, name in (("coulomb_nm", "friction"), ("viscous_nm_s", "viscous")):
+            unit = key.partition("_")[2]
+            value, error = numbers[f"{name}_{unit}"], numbers[f"{name}_error_{unit}"]
+            if value > 2.0 * error:  # only a value that was measured
+                changes["friction", joint, key] = round(value, 4)
     return changes
 
 
@@ -68,18 +70,3 @@ def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, 
         f"{path} is changed; the old file is {backup.name}. Set odrv0.axis0.config.motor.torque_constant of the drives"
         " to the same values, then 'systemctl restart mudskipper'"
     ), Ending.DONE
-
-
-def changes_of(numbers: Mapping[str, Any]) -> dict[tuple[str, ...], float]:
-    """Return new values by configuration key; none where the constant is too uncertain."""
-    joint, constant_nm_a = numbers["joint"], numbers["torque_constant_nm_a"]
-    if not 0.0 < numbers["torque_constant_error_nm_a"] <= LARGEST_UNCERTAINTY * constant_nm_a:
-        return {}
-    changes: dict[tuple[str, ...], float] = {("drive", joint, "torque_constant_nm_a"): round(constant_nm_a, 5)}
-    for key, name, error in (
-        ("coulomb_nm", "friction_nm", "friction_error_nm"),
-        ("viscous_nm_s", "viscous_nm_s", "viscous_error_nm_s"),
-    ):
-        if numbers[name] > 2.0 * numbers[error]:  # only a value that was measured
-            changes["friction", joint, key] = round(numbers[name], 4)
-    return changes

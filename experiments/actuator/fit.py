@@ -33,8 +33,9 @@ from pandas import DataFrame, Series
 
 from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.friction import Loop, friction_of
-from experiments.actuator.plan import Plan, Step, steps_of
+from experiments.actuator.plan import WeighingPlan, WeighingStep, steps_of
 from experiments.study.notebook import Entry
+from firmware_host.configuration.configuration import Configuration
 
 PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
 PAPER_REPEATABILITY = 0.032
@@ -44,7 +45,7 @@ FEWEST = 3  # readings of a line
 LOAD = ("trial", "weight_g", "torque_nm", "current_a", "rest_friction_a")  # columns; without the tare
 
 
-class Line(NamedTuple):
+class FittedLine(NamedTuple):
     """I = slope τ + intercept."""
 
     slope_a_nm: float
@@ -62,7 +63,7 @@ class Line(NamedTuple):
         return self.slope_error / self.slope_a_nm**2
 
 
-def fit_line(loads: DataFrame) -> Line:
+def fit_line(loads: DataFrame) -> FittedLine:
     """Fit current over torque. Needs what `can_fit` checks."""
     torques_nm, currents_a = loads.torque_nm.to_numpy(), loads.current_a.to_numpy()
     columns = np.column_stack([torques_nm, np.ones(len(loads))])
@@ -71,14 +72,14 @@ def fit_line(loads: DataFrame) -> Line:
     leverages = np.sum(columns.T * inverse, axis=0)
     left_out = (currents_a - columns @ (slope, intercept)) / (1.0 - leverages)  # from the line of the other points
     errors = student_factor(len(loads) - 2) * np.sqrt(np.sum((inverse * left_out) ** 2, axis=1))
-    return Line(slope, intercept, *errors.tolist())
+    return FittedLine(slope, intercept, *errors.tolist())
 
 
 def can_fit(loads: DataFrame) -> bool:
     return len(loads) >= FEWEST and loads.weight_g.nunique() > 1
 
 
-def loads_of(plan: Plan, entries: Mapping[str, Entry]) -> DataFrame:
+def loads_of(plan: WeighingPlan, entries: Mapping[str, Entry]) -> DataFrame:
     """Return a row for each weight whose trial has a tare, with the joint's own sign of the current.
 
     A reading that the operator kept as doubtful is left out.
@@ -103,7 +104,7 @@ def tare_of(entries: Mapping[str, Entry], trial: int) -> float | None:
 
 def _tare_a(entries: Mapping[str, Entry], trial: int) -> float | None:
     """Return nothing where the empty arm was not read, or something may have hung on it."""
-    entry = entries.get(Step(trial, 0.0).key, {})
+    entry = entries.get(WeighingStep(trial, 0.0).key, {})
     return None if entry.get("doubt") else entry.get("current_a")
 
 
@@ -112,7 +113,7 @@ def direction_of(loads: DataFrame) -> int:
     return -1 if fsum(loads.torque_nm * loads.current_a) >= 0.0 else 1
 
 
-def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
+def current_per_nm(plan: WeighingPlan, entries: Mapping[str, Entry]) -> float | None:
     """Return the mean over the heavier weights so far, or nothing."""
     loads = loads_of(plan, entries)
     heavy = loads[loads.torque_nm >= LIGHT_NM]
@@ -127,7 +128,16 @@ class JointFit(NamedTuple):
     loops: Sequence[Loop]
 
 
-def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_nm_a: float) -> JointFit | None:
+def fit_joints(
+    plan: WeighingPlan, readings: Mapping[str, Mapping[str, Entry]], configuration: Configuration
+) -> list[JointFit]:
+    """Fit every joint whose readings suffice for a line. `readings` are by joint and step."""
+    constants_nm_a = {joint: configuration.drive[joint].torque_constant_nm_a for joint in plan.joints}
+    fits = (fit_joint(joint, plan, readings[joint], constants_nm_a[joint]) for joint in plan.joints)
+    return [fit for fit in fits if fit is not None]
+
+
+def fit_joint(joint: str, plan: WeighingPlan, entries: Mapping[str, Entry], configured_nm_a: float) -> JointFit | None:
     """Return nothing where the readings do not suffice for a line."""
     loads = loads_of(plan, entries)
     if not can_fit(loads):
@@ -174,7 +184,7 @@ def repeatability(loads: DataFrame) -> float:
     return fmean(stdev(currents_a) / abs(fmean(currents_a)) for currents_a in repeated) if repeated else nan
 
 
-def _offset(line: Line, loads: DataFrame, empty: Sequence[Entry]) -> dict[str, float]:
+def _offset(line: FittedLine, loads: DataFrame, empty: Sequence[Entry]) -> dict[str, float]:
     """Return the offset of the line, and the torque and friction of the empty arm at rest."""
     tares_a, rest_friction_a = [entry["current_a"] for entry in empty], fmean(e["rest_friction_a"] for e in empty)
     spread_a = stdev(tares_a) if len(tares_a) > 1 else nan
@@ -192,10 +202,10 @@ def _offset(line: Line, loads: DataFrame, empty: Sequence[Entry]) -> dict[str, f
 
 def _friction(loops: Sequence[Loop], constant_nm_a: float, error_nm_a: float) -> dict[str, float]:
     """Return dry and viscous friction with their standard errors, which contain that of the torque constant."""
-    found = friction_of(loops)
+    dry_a, dry_error_a, viscous_a_s, viscous_error_a_s = friction_of(loops)
     return {
-        "friction_nm": constant_nm_a * found.dry_a,
-        "friction_error_nm": hypot(constant_nm_a * found.dry_error_a, error_nm_a * found.dry_a),
-        "viscous_nm_s": constant_nm_a * found.viscous_a_s,
-        "viscous_error_nm_s": hypot(constant_nm_a * found.viscous_error_a_s, error_nm_a * found.viscous_a_s),
+        "friction_nm": constant_nm_a * dry_a,
+        "friction_error_nm": hypot(constant_nm_a * dry_error_a, error_nm_a * dry_a),
+        "viscous_nm_s": constant_nm_a * viscous_a_s,
+        "viscous_error_nm_s": hypot(constant_nm_a * viscous_error_a_s, error_nm_a * viscous_a_s),
     }

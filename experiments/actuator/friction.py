@@ -18,7 +18,7 @@ from statistics import fmean, variance
 from typing import NamedTuple
 
 from estimation.strokes.origin_fit import student_factor
-from experiments.actuator.reading import QUIET_S, HeldJoint, MovedError, Sample
+from experiments.actuator.reading import QUIET_S, HeldJoint, HeldSample, MovedError
 
 SWING_RAD = radians(5.0)  # to either side: four and a half periods of the R60's cogging, and the arm stays near level
 SLOW_STEP_RAD = radians(0.6)  # of one move, which takes a tenth of a second
@@ -36,15 +36,6 @@ class Loop(NamedTuple):
     held_a: float = nan  # mean over the travel, both ways: the weight alone, without friction and cogging
 
 
-class Friction(NamedTuple):
-    """NaN where it was not measured. Errors are those of the loops' scatter, with Student's factor."""
-
-    dry_a: float = nan
-    dry_error_a: float = nan
-    viscous_a_s: float = nan
-    viscous_error_a_s: float = nan
-
-
 def swing_arm(held: HeldJoint) -> list[Loop]:
     """Make loops of both speeds about the held angle. Raises MovedError, BenchError, WarmError."""
     middle_rad = held.held_rad
@@ -58,7 +49,7 @@ def swing_arm(held: HeldJoint) -> list[Loop]:
     return loops
 
 
-def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
+def loop_of(up: Sequence[HeldSample], down: Sequence[HeldSample], quick: bool) -> Loop:
     """Evaluate a stroke and the one back, each until it rests. Raises MovedError for a short one."""
     samples, stroke_rad = [*up, *down], _end_rad(up) - _end_rad(down)
     if stroke_rad < SWING_RAD:
@@ -75,28 +66,32 @@ def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
     return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick, held_a)
 
 
-def _end_rad(stroke: Sequence[Sample]) -> float:
+def _end_rad(stroke: Sequence[HeldSample]) -> float:
     """Return the angle at rest."""
     from_s = stroke[-1].now_s - QUIET_S
     return fmean(sample.angle_rad for sample in stroke if sample.now_s >= from_s)
 
 
-def friction_of(loops: Sequence[Loop]) -> Friction:
-    """Fit both parts; all friction counts as dry where the quick loops are hardly quicker."""
+def friction_of(loops: Sequence[Loop]) -> tuple[float, float, float, float]:
+    """Fit dry friction in A and viscous friction in A s, each with its standard error; NaN where it was not measured.
+
+    All friction counts as dry where the quick loops are hardly quicker. The errors are those of the loops' scatter,
+    with Student's factor.
+    """
     slow, quick = ([loop for loop in loops if loop.quick == kind] for kind in (False, True))
     if len(slow) < FEWEST:
-        return Friction()
+        return nan, nan, nan, nan
     slow_a, slow_error_a, slow_rad_s = _mean(slow)
     if len(quick) < FEWEST:
-        return Friction(slow_a, slow_error_a)
+        return slow_a, slow_error_a, nan, nan
     quick_a, quick_error_a, quick_rad_s = _mean(quick)
     if quick_rad_s < SPEED_RATIO * slow_rad_s:
-        return Friction(slow_a, slow_error_a)
+        return slow_a, slow_error_a, nan, nan
     between_rad_s = quick_rad_s - slow_rad_s
     viscous_a_s = (quick_a - slow_a) / between_rad_s
     dry_error_a = hypot(quick_rad_s * slow_error_a, slow_rad_s * quick_error_a) / between_rad_s
     viscous_error_a_s = hypot(slow_error_a, quick_error_a) / between_rad_s
-    return Friction(slow_a - viscous_a_s * slow_rad_s, dry_error_a, viscous_a_s, viscous_error_a_s)
+    return slow_a - viscous_a_s * slow_rad_s, dry_error_a, viscous_a_s, viscous_error_a_s
 
 
 def _mean(loops: Sequence[Loop]) -> tuple[float, float, float]:

@@ -7,10 +7,10 @@ except between the lightest two, which differ by less than friction.
 
 from collections.abc import Mapping
 from math import inf, log
-from typing import Any, NamedTuple
+from typing import Any
 
 from experiments.actuator.fit import can_fit, direction_of, fit_line, loads_of, tare_of
-from experiments.actuator.plan import Plan, Step
+from experiments.actuator.plan import WeighingPlan, WeighingStep
 
 CONSTANT_NM = 0.05  # a lighter load shows friction more than the constant
 FRICTION_NM = 0.012  # error of any reading
@@ -19,13 +19,11 @@ FAR_BETTER = 3.0  # ratio of distances, in logarithms, to the nearest weight of 
 SLIPPED_FRACTION = 0.3  # of the weight, at most, where it has slipped off
 
 
-class Mismatch(NamedTuple):
-    message: str
-    other_g: float | None = None  # the weight that matches far better
+Mismatch = tuple[str, float | None]  # a message, and the weight that matches far better
 
 
 def find_mismatch(
-    plan: Plan, entries: Mapping[str, Any], step: Step, current_a: float, configured_nm_a: float
+    plan: WeighingPlan, entries: Mapping[str, Any], step: WeighingStep, current_a: float, configured_nm_a: float
 ) -> Mismatch | None:
     """Return nothing where the reading matches, or nothing is known to compare it with."""
     tare_a = tare_of(entries, step.trial)
@@ -45,17 +43,17 @@ def find_mismatch(
     return _describe(plan, step.weight_g, held_g)
 
 
-def _describe(plan: Plan, asked_g: float, held_g: float) -> Mismatch:
+def _describe(plan: WeighingPlan, asked_g: float, held_g: float) -> Mismatch:
     reads = f"the motor holds {held_g:.0f} g"
     if not asked_g:
-        return Mismatch(f"{reads} although the arm should be empty: remove what hangs on it or touches it")
+        return f"{reads} although the arm should be empty: remove what hangs on it or touches it", None
     if held_g < SLIPPED_FRACTION * asked_g:
-        return Mismatch(f"{reads}, not {asked_g:g} g: did it slip off?")
+        return f"{reads}, not {asked_g:g} g: did it slip off?", None
     nearest_g = min(plan.weights_g, key=lambda weight_g: _distance(held_g, weight_g))
     if nearest_g != asked_g and FAR_BETTER * _distance(held_g, nearest_g) < _distance(held_g, asked_g):
-        return Mismatch(f"{reads}: that is {nearest_g:g} g rather than {asked_g:g} g", nearest_g)
+        return f"{reads}: that is {nearest_g:g} g rather than {asked_g:g} g", nearest_g
     lever_cm = 100.0 * plan.lever_m
-    return Mismatch(f"{reads}, not {asked_g:g} g: check that it hangs at {lever_cm:g} cm and touches nothing")
+    return f"{reads}, not {asked_g:g} g: check that it hangs at {lever_cm:g} cm and touches nothing", None
 
 
 def _distance(held_g: float, weight_g: float) -> float:

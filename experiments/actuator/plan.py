@@ -31,7 +31,7 @@ COOL_K = 2.0  # below limits.temperature_warm_c, above which torque fades and a 
 
 
 @dataclass(frozen=True)
-class Plan:
+class WeighingPlan:
     """The options of one calibration, the same whenever it continues."""
 
     joints: tuple[str, ...]
@@ -54,7 +54,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Step:
+class WeighingStep:
     """One weight to hang and read, or the empty arm."""
 
     trial: int  # from 1; the tare before the first pass is of trial 0
@@ -74,14 +74,14 @@ class Step:
         return max(self.trial, 1)
 
 
-def steps_of(plan: Plan) -> list[Step]:
+def steps_of(plan: WeighingPlan) -> list[WeighingStep]:
     rising_g, mixed_g = sorted(plan.weights_g), in_turn(plan.weights_g)
     passes = (
-        Step(trial, weight_g)
+        WeighingStep(trial, weight_g)
         for trial in range(1, plan.trials + 1)
         for weight_g in (*(rising_g if trial == 1 else mixed_g), 0.0)
     )
-    return [Step(0, 0.0), *passes]
+    return [WeighingStep(0, 0.0), *passes]
 
 
 def in_turn(weights_g: Sequence[float]) -> list[float]:
@@ -92,21 +92,21 @@ def in_turn(weights_g: Sequence[float]) -> list[float]:
     return ordered
 
 
-def require_possible(plan: Plan, configuration: Configuration) -> None:
+def require_possible(plan: WeighingPlan, configuration: Configuration) -> None:
     """Raises BenchError with all problems."""
     problems = list(_problems(plan, configuration))
     if problems:
         raise BenchError("\n".join(problems))
 
 
-def needed_nm(plan: Plan, configuration: Configuration, weight_g: float) -> float:
+def needed_nm(plan: WeighingPlan, configuration: Configuration, weight_g: float) -> float:
     """Return the least limits.torque_nm for this weight and the arm."""
     arm = configuration.arm
     arm_nm = arm.arm_mass_kg * plan.gravity_m_s2 * arm.center_of_mass_m
     return (plan.torque_nm(weight_g) + arm_nm) * (1.0 + LARGEST_ERROR) / SATURATED_FRACTION
 
 
-def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
+def _problems(plan: WeighingPlan, configuration: Configuration) -> Iterator[str]:
     own = configuration.rig.joints
     missing = [joint for joint in plan.joints if joint not in own]
     if missing:
@@ -139,7 +139,7 @@ def _up(value: float, digits: int) -> float:
     return float(ceil(value * 10.0**digits) / 10.0**digits)
 
 
-def largest_current_a(plan: Plan, configuration: Configuration, joint: str, weight_g: float) -> float:
+def largest_current_a(plan: WeighingPlan, configuration: Configuration, joint: str, weight_g: float) -> float:
     """Return the largest current of the weight, as long as nothing was measured."""
     return plan.torque_nm(weight_g) * (1.0 + LARGEST_ERROR) / configuration.drive[joint].torque_constant_nm_a
 

@@ -49,20 +49,11 @@ class WarmError(Exception):
     """The winding came near the temperature above which torque fades, and the weight would fall."""
 
 
-class Sample(NamedTuple):
+class HeldSample(NamedTuple):
     now_s: float
     angle_rad: float
     current_a: float
     winding_c: float
-
-
-class Side(NamedTuple):
-    """Means over a window at rest after one approach."""
-
-    angle_rad: float
-    current_a: float
-    noise_a: float  # of one sample
-    held_rad: float  # commanded
 
 
 class HeldJoint:
@@ -82,30 +73,30 @@ class HeldJoint:
         """
         below = self._from(1.0)
         above = self._from(-1.0)
-        last, change_a = self.sample(), below.current_a - above.current_a
+        last, change_a = self.sample(), below["current_a"] - above["current_a"]
         if abs(change_a) > CHANGED_A:
             raise MovedError(f"the two approaches differ by {change_a:+.1f} A, as if the load had changed between them")
         return {
-            "current_a": (below.current_a + above.current_a) / 2.0,
+            "current_a": (below["current_a"] + above["current_a"]) / 2.0,
             "rest_friction_a": change_a / 2.0,
-            "angle_rad": (below.angle_rad + above.angle_rad) / 2.0,
+            "angle_rad": (below["angle_rad"] + above["angle_rad"]) / 2.0,
             "winding_c": last.winding_c,
             "at_s": last.now_s,  # by the robot's clock
-            "below": below._asdict(),
-            "above": above._asdict(),
+            "below": below,
+            "above": above,
         }
 
-    def sample(self) -> Sample:
+    def sample(self) -> HeldSample:
         return self._sample_of(self._robot.call("status"))
 
-    def _sample_of(self, status: dict[str, Any]) -> Sample:
+    def _sample_of(self, status: dict[str, Any]) -> HeldSample:
         require_hold(status)
         drive = status["drives"][self._index]
         if drive["winding_c"] >= self._warm_c:
             raise WarmError(f"the {self._joint} winding has {drive['winding_c']:.0f} °C")
-        return Sample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
+        return HeldSample(status["now_s"], drive["angle_rad"], drive["current_a"], drive["winding_c"])
 
-    def stroke(self, angle_rad: float, step_rad: float) -> list[Sample]:
+    def stroke(self, angle_rad: float, step_rad: float) -> list[HeldSample]:
         """Return the samples on the way to an angle, in moves of at most this size, until it rests."""
         samples = []
         for next_rad in _path_rad(self.held_rad, angle_rad, step_rad):
@@ -118,7 +109,7 @@ class HeldJoint:
                 raise BenchError(status["notice"])
         return samples + self._window(QUIET_S)
 
-    def _from(self, direction: float) -> Side:
+    def _from(self, direction: float) -> Entry:
         self._go_off(direction)
         for _ in range(MOST_STEPS):
             left_rad = -direction * self._resting_rad()
@@ -155,18 +146,23 @@ class HeldJoint:
             self.held_rad = next_rad
             move(self._robot, {self._joint: next_rad})
 
-    def _settled(self) -> Side:
+    def _settled(self) -> Entry:
+        """Return the means over a window at rest, the noise of one sample, and the commanded angle."""
         problem = ""
         for _ in range(MOST_WINDOWS):
             samples = self._window(WINDOW_S)
             problem = find_motion(samples)
             if not problem:
                 currents_a = [sample.current_a for sample in samples]
-                angle_rad = fmean(sample.angle_rad for sample in samples)
-                return Side(angle_rad, fmean(currents_a), pstdev(currents_a), self.held_rad)
+                return {
+                    "angle_rad": fmean(sample.angle_rad for sample in samples),
+                    "current_a": fmean(currents_a),
+                    "noise_a": pstdev(currents_a),
+                    "held_rad": self.held_rad,
+                }
         raise MovedError(problem)
 
-    def _window(self, duration_s: float) -> list[Sample]:
+    def _window(self, duration_s: float) -> list[HeldSample]:
         samples = [self.sample()]
         while samples[-1].now_s < samples[0].now_s + duration_s:
             self._robot.wait(SAMPLE_S)
@@ -181,7 +177,7 @@ def _path_rad(start_rad: float, end_rad: float, step_rad: float) -> Iterator[flo
         yield start_rad + (end_rad - start_rad) * step / steps
 
 
-def find_motion(samples: list[Sample]) -> str:
+def find_motion(samples: list[HeldSample]) -> str:
     """Return a message on what moved in a window; empty where nothing did."""
     angles_rad = [sample.angle_rad for sample in samples]
     swing_rad = max(angles_rad) - min(angles_rad)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from pandas import DataFrame
 
@@ -13,7 +12,7 @@ from experiments.actuator.fit import (
     JointFit,
     repeatability,
 )
-from experiments.actuator.plan import Plan, steps_of
+from experiments.actuator.plan import WeighingPlan, steps_of
 from experiments.actuator.plots import draw_friction, draw_torques
 from experiments.actuator.simulation import truth_rows
 from experiments.reports.text_tables import number
@@ -25,6 +24,14 @@ Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
 TITLE = "Actuator calibration"
 CONSTANTS, FRICTION, TRUTH = "Torque constants", "Friction and offset", "The simulated motors themselves"
 CONSTANTS_HEADING = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
+FRICTION_COLUMNS = {  # values with their errors, by their keys in JSON
+    "dry friction": ("friction_nm", "friction_error_nm"),
+    "viscous": ("viscous_nm_s", "viscous_error_nm_s"),
+    "at rest at least": ("rest_friction_nm",),
+    "offset": ("offset_nm", "offset_error_nm"),
+    "empty arm": ("tare_nm", "tare_spread_nm"),
+    "swinging": ("lifted_nm",),
+}
 FRICTION_HEADING = "Friction and offset ± one standard error"
 
 TORQUES = (
@@ -71,11 +78,16 @@ PAPER = {
 
 
 def make_result(
-    plan: Plan, readings: Readings, fits: Sequence[JointFit], applied: str | None, simulated: bool
+    plan: WeighingPlan, readings: Readings, fits: Sequence[JointFit], applied: str | None, simulated: bool
 ) -> Result:
     """Return tables, figures and numbers. `applied` is a message on the configuration file."""
-    fitted, left_out = {fit.numbers["joint"] for fit in fits}, list_left_out(plan, readings)
     tables, figures = [_constant_table(fits), _friction_table(fits)], list[Figure]()
+    left_out = [  # skipped, or kept as doubtful and not fitted
+        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
+        for joint, entries in readings.items()
+        for step in steps_of(plan)
+        if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
+    ]
     if simulated:
         tables.append(Table("truth", TRUTH, {}, DataFrame(truth_rows(fits)), TRUTH))
     for fit in fits:
@@ -93,46 +105,35 @@ def make_result(
         lever_cm=100.0 * plan.lever_m,
         millimetre_percent=0.1 / plan.lever_m,
     )
-    summary = {
-        "plan": plan,
-        "joints": [fit.numbers for fit in fits],
-        "not_fitted": [joint for joint in plan.joints if joint not in fitted],
-        "left_out": left_out,
-        "readings": readings,
-        "applied": applied,
-        "paper": PAPER,
-    }
+    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
+    not_fitted = [joint for joint in plan.joints if joint not in directions]
+    upward = [joint for joint, direction in directions.items() if direction > 0 and joint.endswith("adduction")]
+    remarks = [
+        *(f"{joint}: too few readings for a line" for joint in not_fitted),
+        *(
+            f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
+            for joint in upward
+        ),
+        f"{len(left_out)} readings are left out: see the report" if left_out else "",
+        applied or "",
+    ]
     texts = {CONSTANTS: DEFINITIONS, **{table.section: "" for table in tables[1:]}}
     return Result(
         tables=tables,
         figures=figures,
-        summary=summary,
+        summary={
+            "plan": plan,
+            "joints": [fit.numbers for fit in fits],
+            "not_fitted": not_fitted,
+            "left_out": left_out,
+            "readings": readings,
+            "applied": applied,
+            "paper": PAPER,
+        },
         title=TITLE,
         texts=texts | {"What to set where": SETTING, "How it was measured": method},
+        notes=[*filter(None, remarks)],
     )
-
-
-def list_left_out(plan: Plan, readings: Readings) -> list[dict[str, Any]]:
-    """Return the readings that were skipped, or kept as doubtful and not fitted."""
-    return [
-        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
-        for joint, entries in readings.items()
-        for step in steps_of(plan)
-        if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
-    ]
-
-
-def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int) -> list[str]:
-    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
-    remarks = [f"{joint}: too few readings for a line" for joint in joints if joint not in directions]
-    remarks += [
-        f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
-        for joint, direction in directions.items()
-        if direction > 0 and joint.endswith("adduction")
-    ]
-    if left_out:
-        remarks.append(f"{left_out} readings are left out: see the report")
-    return remarks
 
 
 def _constant_table(fits: Sequence[JointFit]) -> Table:
@@ -164,20 +165,11 @@ def _constant_table(fits: Sequence[JointFit]) -> Table:
 
 def _friction_table(fits: Sequence[JointFit]) -> Table:
     rows = [
-        {
-            "joint": numbers["joint"],
-            "dry friction": value_text(numbers["friction_nm"], numbers["friction_error_nm"]),
-            "viscous": value_text(numbers["viscous_nm_s"], numbers["viscous_error_nm_s"]),
-            "at rest at least": f"{numbers['rest_friction_nm']:.4f}",
-            "offset": value_text(numbers["offset_nm"], numbers["offset_error_nm"]),
-            "empty arm": value_text(numbers["tare_nm"], numbers["tare_spread_nm"]),
-            "swinging": number(numbers["lifted_nm"], 4),
-        }
+        {"joint": numbers["joint"]}
+        | {head: value_text(*(numbers[name] for name in names)) for head, names in FRICTION_COLUMNS.items()}
         for numbers, *_ in fits
     ]
-    units = dict.fromkeys(("dry friction", "at rest at least", "offset", "empty arm", "swinging"), "N·m") | {
-        "viscous": "N·m·s"
-    }
+    units = dict.fromkeys(FRICTION_COLUMNS, "N·m") | {"viscous": "N·m·s"}
     return Table("friction", FRICTION_HEADING, units, DataFrame(rows), FRICTION)
 
 

@@ -22,12 +22,12 @@ from random import Random
 from typing import NamedTuple
 
 from experiments.actuator.fit import JointFit
-from experiments.actuator.plan import Plan, Step
-from experiments.actuator.weight_handling import ManualWeights
+from experiments.actuator.plan import WeighingPlan, WeighingStep
+from experiments.actuator.weighing import WeightHandler
 from experiments.bench.rig import on_bench
 from experiments.reports.value_text import miss_text
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.study.prompt import GO_ON
+from experiments.study.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.trials.trial import BENCH_CURRENT_A
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.bench_mount import BenchMount
@@ -75,15 +75,15 @@ class BuiltRobot(NamedTuple):
 def simulated_bench(
     configuration: Configuration,
     joint: str,
-    plan: Plan,
+    plan: WeighingPlan,
     seed: int,
     log: Path,
     built: BuiltRobot | None = None,
-    prompts: ManualWeights | None = None,
+    operator: Operator | None = None,
 ) -> tuple[LockstepRobot, SimulatedWeights]:
     """Make a robot with a flipper over the bench's edge, and the handler of its weights.
 
-    `log` must be new. With `prompts` the weights wait for their answers.
+    `log` must be new. With an `operator` the weights wait for their answers.
     """
     built = built or BuiltRobot(configuration)
     random = Random(f"bench {seed} {joint}")
@@ -102,75 +102,48 @@ def simulated_bench(
         for name, drive in built.configuration.drive.items()
     }
     lockstep = Lockstep(on_bench(configuration), paper_track(), seed, recorder, plant=plant, drives=drives)
-    weights = SimulatedWeights(lockstep, joint, plan, seed)
-    if prompts:
-        weights = PractisedWeights(lockstep, joint, plan, seed, prompts)
-    return LockstepRobot(lockstep, recorder), weights
+    operator = operator or AutomaticOperator(lambda message: None)
+    return LockstepRobot(lockstep, recorder), SimulatedWeights(operator, plan, joint, lockstep, seed)
 
 
-class SimulatedWeights:
-    """A WeightHandler that acts on the mount of the simulated arms."""
+class SimulatedWeights(WeightHandler):
+    """Moves the mounts of the simulated arms as each prompt asks for, once it is answered."""
 
     handling_s = 0.0
 
-    def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int) -> None:
-        self._lockstep = lockstep
-        self._plan = plan
-        self._random = Random(f"hand {seed}")
+    def __init__(self, operator: Operator, plan: WeighingPlan, joint: str, lockstep: Lockstep, seed: int) -> None:
+        super().__init__(operator, plan, joint)
+        self._lockstep, self._random = lockstep, Random(f"hand {seed}")
         self._arms = lockstep.robot.plant.arms
-        for arm in self._arms:
-            arm.mount = BenchMount(on_side=joint.endswith("sweep"), held=True)
+        self._mounts = [BenchMount(on_side=joint.endswith("sweep"), held=True) for _ in self._arms]
+        for arm, mount in zip(self._arms, self._mounts, strict=True):
+            arm.mount = mount
             arm.put_back()
-        mount = self._arms[lockstep.loop.configuration.rig.joints.index(joint) // 2].mount
-        assert mount is not None
-        self.mount = mount
+        self.mount = self._mounts[lockstep.loop.configuration.rig.joints.index(joint) // 2]
 
-    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+    def hold_level(self, meanwhile: Callable[[], None]) -> None:
         self.mount.take_off()
-        for arm in self._arms:
+        for arm, mount in zip(self._arms, self._mounts, strict=True):
             arm.put_back()
-        self._hold(True)
+            mount.held = True
+        super().hold_level(meanwhile)
 
     def release(self, meanwhile: Callable[[], None]) -> None:
-        self._hold(False)
-
-    def _hold(self, held: bool) -> None:
-        for arm in self._arms:
-            assert arm.mount is not None
-            arm.mount.held = held
-
-    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        """Lower the weight in steps, since a dropped one swings the arm to its end."""
-        before_kg, lever_m = self.mount.mass_kg, self._plan.lever_m + self._random.gauss(0.0, LEVER_SD_M)
-        for part in range(1, HANGING_PARTS + 1):
-            more_kg = (step.weight_g / 1000.0 - before_kg) * part / HANGING_PARTS
-            self.mount.hang(before_kg + more_kg, lever_m)
-            self._lockstep.run_for(HANGING_S / HANGING_PARTS)
-        return GO_ON
-
-    def take_off(self) -> None:
-        self.mount.take_off()
-
-
-class PractisedWeights(SimulatedWeights):
-    """SimulatedWeights of an operator who practises: they do what each prompt asks for, once it is answered."""
-
-    def __init__(self, lockstep: Lockstep, joint: str, plan: Plan, seed: int, prompts: ManualWeights) -> None:
-        super().__init__(lockstep, joint, plan, seed)
-        self._prompts = prompts
-
-    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
-        super().hold_level(joint, meanwhile)
-        self._prompts.hold_level(joint, meanwhile)
-
-    def release(self, meanwhile: Callable[[], None]) -> None:
-        self._prompts.release(meanwhile)
         super().release(meanwhile)
+        for mount in self._mounts:
+            mount.held = False
 
-    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
-        answer = self._prompts.hang(step, meanwhile)
-        return super().hang(step, meanwhile) if answer == GO_ON else answer
+    def hang(self, step: WeighingStep, meanwhile: Callable[[], None]) -> str:
+        """Lower the weight in steps, since a dropped one swings the arm to its end."""
+        answer = super().hang(step, meanwhile)
+        if answer == GO_ON:
+            before_kg, lever_m = self.mount.mass_kg, self.plan.lever_m + self._random.gauss(0.0, LEVER_SD_M)
+            for part in range(1, HANGING_PARTS + 1):
+                more_kg = (step.weight_g / 1000.0 - before_kg) * part / HANGING_PARTS
+                self.mount.hang(before_kg + more_kg, lever_m)
+                self._lockstep.run_for(HANGING_S / HANGING_PARTS)
+        return answer
 
     def take_off(self) -> None:
-        self._prompts.take_off()
         super().take_off()
+        self.mount.take_off()

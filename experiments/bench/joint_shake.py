@@ -15,9 +15,11 @@ leave a speed as well, and ends the shake.
 
 from math import nan
 
+import numpy as np
+
 from control.rate import PERIOD_S
 from control.records import DriveStates, Torques
-from experiments.bench.test_rig import TestRig, idle, torque_on
+from experiments.bench.test_rig import TestRig, idle, signals, torque_on
 from experiments.robot.bench_errors import BenchError
 
 FIRST_NM, GROWTH = 0.02, 1.5
@@ -73,8 +75,8 @@ def shake_joint(test_rig: TestRig, joint: str) -> Shake:
     index, kind = test_rig.index_of(joint), joint.split("_")[1]
     test_rig.controller.hold_law = idle
     for _ in range(TRIES):
-        at_rest = [sample.states[index].angle_rad for sample in test_rig.run_for(REST_TICKS * PERIOD_S)]
-        law = Shake(index, SHAKES[kind], max(SHAKEN_RAD, JITTERS * (max(at_rest) - min(at_rest))))
+        at_rest_rad = signals(test_rig.run_for(REST_TICKS * PERIOD_S), "angle_rad")[:, index]
+        law = Shake(index, SHAKES[kind], max(SHAKEN_RAD, JITTERS * float(np.ptp(at_rest_rad))))
         if _is_punctual(test_rig, joint, law):
             return law
     raise BenchError("Ticks are missed while a joint is shaken: end other programs; run 'mudskipper doctor'.")

@@ -5,7 +5,7 @@ from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
 
-class Reading(NamedTuple):
+class BenchReading(NamedTuple):
     what: str
     value: float  # NaN: not measurable, which is never good
     unit: str = ""
@@ -16,7 +16,7 @@ class Reading(NamedTuple):
 
     @property
     def good(self) -> bool:
-        return self.left_out or self.low <= self.value <= self.high
+        return bool(self.left_out or self.low <= self.value <= self.high)  # numbers may be numpy's
 
     @property
     def number_text(self) -> str:
@@ -51,8 +51,8 @@ class Reading(NamedTuple):
                 "advice": self.advice}  # fmt: skip
 
 
-def left_out(what: str) -> Reading:
-    return Reading(what, nan, left_out=True)
+def left_out(what: str) -> BenchReading:
+    return BenchReading(what, nan, left_out=True)
 
 
-Readings = Iterator[Reading]
+BenchReadings = Iterator[BenchReading]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import gc
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -23,12 +22,13 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveCalibration, DriveParameters
-from drivers.drive_types import collisions, make_drives, type_of
+from drivers.drive_types import make_drives, type_of
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_errors import BenchError
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.configuration.configuration import BusParameters, Configuration
+from firmware_host.configuration.consistency import contradictions
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick, Ticker
@@ -197,36 +197,25 @@ def on_channels(configuration: Configuration, given: Sequence[str]) -> Configura
 
     Buses that share a channel are one bus: its drives then need different node ids.
     """
-    channels = {name: channel for argument in given for name, channel in _named(configuration, argument).items()}
+    channels: dict[str, str] = {}
+    for argument in given:
+        name, equals, channel = argument.rpartition("=")
+        if not channel:
+            raise BenchError(f"--can {argument}: a channel is missing, as in --can left=can0.")
+        if equals and name not in configuration.bus:
+            raise BenchError(f"--can {argument}: no bus {name!r} is configured, only {', '.join(configuration.bus)}.")
+        channels |= {name: channel} if equals else dict.fromkeys(configuration.bus, channel)
     first_on = {channel: name for name, channel in reversed(channels.items())}
-    buses: dict[str, BusParameters] = {}
-    for name, bus in configuration.bus.items():
-        if name not in channels:
-            buses[name] = bus
-        elif first_on[channels[name]] == name:
-            buses[name] = BusParameters("socketcan", channels[name], bit_rate_kbit_s=bus.bit_rate_kbit_s)
+    moved = {name: first_on[channel] for name, channel in channels.items() if first_on[channel] != name}
+    buses = {name: bus for name, bus in configuration.bus.items() if name not in moved}
+    for name in buses.keys() & channels.keys():
+        bit_rate_kbit_s = buses[name].bit_rate_kbit_s
+        buses[name] = BusParameters("socketcan", channels[name], bit_rate_kbit_s=bit_rate_kbit_s)
     drives = {
-        joint: replace(drive, bus=first_on[channels[drive.bus]] if drive.bus in channels else drive.bus)
+        joint: replace(drive, bus=moved[drive.bus], calibrated=DriveCalibration()) if drive.bus in moved else drive
         for joint, drive in configuration.drive.items()
     }
-    for (bus_name, node_id), count in Counter((drive.bus, drive.node_id) for drive in drives.values()).items():
-        if count > 1:
-            channel = buses[bus_name].channel
-            raise BenchError(
-                f"{count} drives have the node id {node_id} on {channel}: give each bus its own --can NAME=channel."
-            )
-    for first, second, identifier in collisions(drives):
-        channel, both = buses[drives[first].bus].channel, f"{first} and {second} both use"
-        raise BenchError(f"{both} the id 0x{identifier:03x} on {channel}: give each bus its own --can NAME=channel.")
-    return replace(configuration, bus=buses, drive=drives)
-
-
-def _named(configuration: Configuration, argument: str) -> dict[str, str]:
-    name, equals, channel = argument.rpartition("=")
-    if not channel:
-        raise BenchError(f"--can {argument}: a channel is missing, as in --can left=can0.")
-    if not equals:
-        return dict.fromkeys(configuration.bus, channel)
-    if name not in configuration.bus:
-        raise BenchError(f"--can {argument}: no bus {name!r} is configured, only {', '.join(configuration.bus)}.")
-    return {name: channel}
+    changed = replace(configuration, bus=buses, drive=drives)
+    for problem in contradictions(changed):
+        raise BenchError(f"{problem} on {' and '.join(first_on)}: give each bus its own --can NAME=channel.")
+    return changed

@@ -6,15 +6,18 @@ angle, velocity and current have the sign of the torque. A drive agrees with its
 the joint is then moved further under control, and the operator observes which flipper moves, and how.
 """
 
-from math import fsum, nan, radians
+from math import nan, radians
+from statistics import fmean
+
+import numpy as np
 
 from control.controller import measured_angles
 from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Rig, Torques
 from experiments.bench.joint_shake import ADVICE, shake_joint
 from experiments.bench.operator import MOTIONS, Observation
-from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.test_rig import Sample, TestRig, idle, torque_on
+from experiments.bench.reading import BenchReading, BenchReadings, left_out
+from experiments.bench.test_rig import TestRig, TickSample, idle, signals, torque_on
 
 STEP_NM = 0.01  # a fifth of the torque that holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to start moving before the next step
@@ -47,12 +50,12 @@ class Nudge:
         return torque_on(held, self.index, self.torque_nm)
 
 
-def check_nudge(test_rig: TestRig, joint: str) -> Readings:
+def check_nudge(test_rig: TestRig, joint: str) -> BenchReadings:
     """Check the motion of one joint. Raises BenchError where a fault ends it."""
     index = test_rig.index_of(joint)
     test_rig.arm(idle)
     shaken = shake_joint(test_rig, joint)
-    yield Reading(f"{joint}: answer to a shake", shaken.answer_rad, "rad", shaken.least_rad, 1.0, ADVICE)
+    yield BenchReading(f"{joint}: answer to a shake", shaken.answer_rad, "rad", shaken.least_rad, 1.0, ADVICE)
     if not shaken.answered:
         test_rig.switch_off()
         return
@@ -65,30 +68,31 @@ def check_nudge(test_rig: TestRig, joint: str) -> Readings:
     test_rig.switch_off()
 
 
-def _agreement(rig: Rig, joint: str, begun: DriveStates, samples: list[Sample], nudge: Nudge) -> Readings:
+def _agreement(rig: Rig, joint: str, begun: DriveStates, samples: list[TickSample], nudge: Nudge) -> BenchReadings:
     index = nudge.index
-    moved_rad = [
-        end - start for start, end in zip(measured_angles(begun), measured_angles(samples[-1].states), strict=True)
-    ]
+    moved_rad = np.subtract(measured_angles(samples[-1].states), measured_angles(begun)).tolist()
     stuck = (
         f"free what blocks it; else the motor presses a flipper down: check drive.{joint}.sign, and whether its node id"
         " is another joint's"
     )
-    yield Reading(f"{joint}: torque that moves it", nudge.torque_nm if nudge.moved else nan, "N·m", 0.0, MOST_NM, stuck)
+    yield BenchReading(
+        f"{joint}: torque that moves it", nudge.torque_nm if nudge.moved else nan, "N·m", 0.0, MOST_NM, stuck
+    )
     contrary = f"calibrate the drive of {joint} again: its encoder counts against its motor"
     path_rad = moved_rad[index]
-    yield Reading(
+    yield BenchReading(
         f"{joint}: motion under torque", path_rad, "rad", MOVED_RAD, 0.5, contrary if path_rad < 0.0 else stuck
     )
-    fastest_rad_s = max((sample.states[index].velocity_rad_s for sample in samples), key=abs)
-    yield Reading(f"{joint}: velocity with it", fastest_rad_s, "rad/s", 0.0, 20.0, contrary)
-    late = samples[-round(STEP_S / PERIOD_S) :]
-    mean_a = fsum(sample.states[index].current_a for sample in late) / len(late)
-    yield Reading(f"{joint}: current with it", mean_a, "A", FEWEST_A, 20.0, f"{contrary}, or its current sensor is off")
+    fastest_rad_s = max(signals(samples, "velocity_rad_s")[:, index].tolist(), key=abs)
+    yield BenchReading(f"{joint}: velocity with it", fastest_rad_s, "rad/s", 0.0, 20.0, contrary)
+    mean_a = fmean(signals(samples[-round(STEP_S / PERIOD_S) :], "current_a")[:, index])
+    yield BenchReading(
+        f"{joint}: current with it", mean_a, "A", FEWEST_A, 20.0, f"{contrary}, or its current sensor is off"
+    )
     for other, other_rad in zip(rig.joints, moved_rad, strict=True):
         if other != joint:
             advice = f"commands to {joint} reach {other}, or something couples them: check node ids and mechanics"
-            yield Reading(f"{joint}: {other} meanwhile", other_rad, "rad", -OTHERS_RAD, OTHERS_RAD, advice)
+            yield BenchReading(f"{joint}: {other} meanwhile", other_rad, "rad", -OTHERS_RAD, OTHERS_RAD, advice)
 
 
 def hold_gently(held: Torques, states: DriveStates) -> Torques:
@@ -96,22 +100,22 @@ def hold_gently(held: Torques, states: DriveStates) -> Torques:
     return held.map(lambda torque_nm: min(max(torque_nm, -MOST_NM), MOST_NM))
 
 
-def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
+def check_shown_motion(test_rig: TestRig, joint: str) -> BenchReadings:
     """Check that the operator sees the motion that the encoders report."""
-    index, bench_operator = test_rig.index_of(joint), test_rig.operator
+    index, hand = test_rig.index_of(joint), test_rig.operator.hand
     test_rig.arm(hold_gently)
     here = measured_angles(test_rig.run_for(test_rig.configuration.motion.fade_in_s)[-1].states)
-    bench_operator.start_observing()
+    before_rad = hand.look()
     there = Joints(*(angle_rad + SHOWN_RAD * (index == other) for other, angle_rad in enumerate(here)))
     test_rig.move([there], SHOWING_RAD_S, hold_gently)
     test_rig.run_for(0.3)
-    bench_operator.observe_farthest()
+    seen_rad = np.subtract(hand.look(), before_rad).tolist()
     test_rig.move([here], SHOWING_RAD_S, hold_gently)
     test_rig.switch_off()
-    observation = bench_operator.observed_motion(joint, test_rig.run_during_prompt)
+    observation = test_rig.operator.observed_motion(joint, index, seen_rad, test_rig.run_during_prompt)
     side, kind = joint.split("_")
     what = f"{joint}: the {side} flipper was observed to {MOTIONS[kind]}"
     if observation is Observation.UNSEEN:
         yield left_out(what)
         return
-    yield Reading(what, observation is Observation.RIGHT, "", 1, 1, observation.value.format(joint=joint))
+    yield BenchReading(what, observation is Observation.RIGHT, "", 1, 1, observation.value.format(joint=joint))

@@ -1,4 +1,4 @@
-"""The hands of an operator at a simulated robot: they hold all joints, and turn one of them at a steady speed."""
+"""The hands and eyes of an operator at a simulated robot: they hold all joints and turn one at a steady speed."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -6,17 +6,21 @@ from dataclasses import replace
 from math import ceil
 
 from control.rate import PERIOD_S
+from experiments.bench.operator import BenchOperator, Hand
 from experiments.bench.rig import SimulatedRig
+from experiments.study.prompt import AutomaticOperator
+from simulation.body.plant import END_STOPS_RAD
 
 SPEED_RAD_S = 7.0
 HELD_KG_M2 = 1e6  # inertia of a held joint: its own weight and its motor do not move it
 
 
-class SimulatedHand:
+class SimulatedHand(Hand):
     """Owns where the joints are held."""
 
     def __init__(self, rig: SimulatedRig) -> None:
-        self._arms = rig.robot.plant.arms
+        self._plant, self._joints = rig.robot.plant, rig.configuration.rig.joints
+        self._arms = self._plant.arms
         self._free = [arm.parameters for arm in self._arms]
         self._held_rad: list[float] = []  # empty: not held
         self._index = 0  # of the joint that is turned
@@ -27,21 +31,21 @@ class SimulatedHand:
     def is_turning(self) -> bool:
         return bool(self._path_rad)
 
-    def hold(self, angles_rad: Sequence[float]) -> None:
-        self._held_rad = list(angles_rad)
+    def hold(self, adduction_rad: float = 0.0) -> None:
+        self._held_rad = [0.0, adduction_rad] * len(self._arms)
         for arm in self._arms:
             heavy = replace(arm.parameters.arm_mass, sweep_inertia_kg_m2=HELD_KG_M2, adduction_inertia_kg_m2=HELD_KG_M2)
             arm.parameters = replace(arm.parameters, arm_mass=heavy)
 
-    def turn(self, index: int, angle_rad: float) -> None:
-        """Turn a held joint to an angle, in the ticks that follow."""
+    def turn(self, joint: str, end: float) -> None:
+        """Turn in the ticks that follow."""
+        self._index = index = self._joints.index(joint)
+        angle_rad = end * END_STOPS_RAD[index % 2]
         from_rad = self._path_rad[-1] if self._path_rad else self._held_rad[index]
         steps = max(1, ceil(abs(angle_rad - from_rad) / (SPEED_RAD_S * PERIOD_S)))
-        self._index = index
         self._path_rad.extend(from_rad + (angle_rad - from_rad) * step / steps for step in range(1, steps + 1))
 
     def release(self) -> None:
-        """Let go: the flippers lie down."""
         self._held_rad = []
         for arm, free in zip(self._arms, self._free, strict=True):
             arm.parameters = free
@@ -59,3 +63,11 @@ class SimulatedHand:
             own = slice(2 * number, 2 * number + 2)
             arm.sweep_rad, arm.adduction_rad = self._held_rad[own]
             arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s = velocities_rad_s[own]
+
+    def look(self) -> Sequence[float]:
+        return self._plant.angles_rad
+
+
+def simulated_operator(rig: SimulatedRig) -> BenchOperator:
+    """Return an operator who allows everything, and whose hands and eyes are simulated."""
+    return BenchOperator(AutomaticOperator(lambda message: None), SimulatedHand(rig), sure=True)

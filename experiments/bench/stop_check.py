@@ -9,17 +9,19 @@ last tick before the request, because the torque does not change in a missed tic
 """
 
 from collections.abc import Sequence
-from math import degrees, nan, radians
+from math import nan, radians
+
+import numpy as np
 
 from control.controller import DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import FlipperJoints, JointAngles, Phase, Rig, same_for_all, same_for_each
+from control.records import FlipperJoints, Phase, same_for_all, same_for_each
 from drivers.drive import DriveParameters
-from experiments.bench.reading import Reading, Readings
+from experiments.bench.reading import BenchReading, BenchReadings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
-from experiments.bench.test_rig import Sample, TestRig, first_lasting
+from experiments.bench.test_rig import TestRig, TickSample, first_lasting, signals
 
 FULL_FRACTION = 0.9  # of the commanded speed: more counts as full speed
 REST_RAD_S = 0.2
@@ -41,9 +43,8 @@ COASTING_DEG = 60.0  # from the start to the stops
 BRAKES = "raise the damping in [gains], and see what drives the joints on"
 
 
-def check_soft_stop(test_rig: TestRig) -> Readings:
+def check_soft_stop(test_rig: TestRig) -> BenchReadings:
     """Check the soft stop. The robot is idle before and after, as in all checks."""
-    rig = test_rig.configuration.rig
     full_rad_s = test_rig.configuration.gait.stance_speed_m_s / test_rig.configuration.geometry.flipper_length_m
     with test_rig.flippers_raised():
         order_strides(test_rig, 2)
@@ -52,18 +53,17 @@ def check_soft_stop(test_rig: TestRig) -> Readings:
             20.0,
             "The full speed of a stance",
         )[-1]
-        begun = measured_angles(test_rig.loop.states)
         test_rig.loop.request(Request.STOP, test_rig.rig.now_s)
         samples = test_rig.run_until(
             lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop"
         )
-    yield from _sweep_readings(rig, "soft stop", last, samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
+    yield from _sweep_readings(test_rig, "soft stop", last, samples, SOFT_REST_S, SOFT_TRAVEL_DEG)
     whole_s = PERIOD_S * ticks_until(samples[-1], last)
     advice = "something holds the flippers down: see that they hang free"
-    yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
+    yield BenchReading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
 
 
-def check_damping(test_rig: TestRig) -> Readings:
+def check_damping(test_rig: TestRig) -> BenchReadings:
     rig = test_rig.configuration.rig
     with test_rig.flippers_raised():
         test_rig.move([same_for_each(SWING_RAD, 0.0, rig)])
@@ -71,15 +71,14 @@ def check_damping(test_rig: TestRig) -> Readings:
         last = test_rig.run_until(
             lambda sample: _is_fast(sample, FULL_FRACTION * FAST_RAD_S), 2.0, "The full speed of a sweep"
         )[-1]
-        begun = measured_angles(test_rig.loop.states)
         gains, trusted = test_rig.configuration.gains, same_for_all(True, rig)
         test_rig.controller.hold_law = lambda held, states: damping_torques_nm(states, gains, trusted, DAMPING_NM)
         samples = test_rig.run_for(2.0 * DAMPED_REST_S)
         test_rig.hold_present_pose()
-    yield from _sweep_readings(rig, "damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
+    yield from _sweep_readings(test_rig, "damping", last, samples, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
-def check_torque_off(test_rig: TestRig) -> Readings:
+def check_torque_off(test_rig: TestRig) -> BenchReadings:
     rig = test_rig.configuration.rig
     test_rig.raise_flippers()
     test_rig.move([same_for_each(*STARTING, rig)])
@@ -87,56 +86,55 @@ def check_torque_off(test_rig: TestRig) -> Readings:
     pushing_nm = constants_nm_a.map(lambda constant_nm_a: PUSH_A * constant_nm_a)  # forward and up
     test_rig.controller.hold_law = lambda held, states: pushing_nm
     pushed = test_rig.run_for(PUSH_TICKS * PERIOD_S)
-    begun = measured_angles(test_rig.loop.states)
     test_rig.loop.request(Request.DISARM, test_rig.rig.now_s)
     samples = [test_rig.tick() for _ in range(round(COASTING_S / PERIOD_S))]
     for index, joint in enumerate(rig.joints):
         yield from _off_readings(joint, test_rig.configuration.drive[joint], pushed, samples, index)
     advice = "see what drives it on"
-    yield from _sweep_readings(rig, "torque off", pushed[-1], samples, begun, COASTING_S, COASTING_DEG, advice)
+    yield from _sweep_readings(test_rig, "torque off", pushed[-1], samples, COASTING_S, COASTING_DEG, advice)
 
 
 def _off_readings(
-    joint: str, drive: DriveParameters, pushed: Sequence[Sample], samples: Sequence[Sample], index: int
-) -> Readings:
-    flowed_a = max(abs(sample.states[index].current_a) for sample in pushed)
+    joint: str, drive: DriveParameters, pushed: Sequence[TickSample], samples: Sequence[TickSample], index: int
+) -> BenchReadings:
+    flowed_a = np.abs(signals(pushed, "current_a")[:, index]).max()
     few = f"{PUSH_A:g} A were commanded: see stage 4"
-    yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
-    quiet = first_lasting([abs(sample.states[index].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
+    yield BenchReading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
+    quiet = first_lasting(samples, np.abs(signals(samples, "current_a")[:, index]) < QUIET_A, QUIET_TICKS)
     advice = "the drive does not obey 'idle': have the power switch at hand, and check its firmware"
-    ticks = ticks_until(None if quiet is None else samples[quiet], pushed[-1]) - 1  # 'idle' leaves in the next one
+    ticks = ticks_until(quiet, pushed[-1]) - 1  # 'idle' leaves in the next one
     latest = OFF_TICKS + (round(drive.heartbeat_period_s / PERIOD_S) if drive.holds_idle_current else 0)
-    yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, latest, advice)
+    yield BenchReading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, latest, advice)
     idle = next((sample for sample in samples if not sample.states[index].closed_loop), None)
     idle_s = PERIOD_S * ticks_until(idle, pushed[-1])
     latest_s = drive.heartbeat_period_s + OFF_TICKS * PERIOD_S
-    yield Reading(f"{joint}: torque off, until it says so", idle_s, "s", 0.0, latest_s, advice)
+    yield BenchReading(f"{joint}: torque off, until it says so", idle_s, "s", 0.0, latest_s, advice)
 
 
-def _is_fast(sample: Sample, speed_rad_s: float) -> bool:
+def _is_fast(sample: TickSample, speed_rad_s: float) -> bool:
     return all(abs(sweep.velocity_rad_s) > speed_rad_s for sweep, _ in sample.states.flippers)
 
 
 def _sweep_readings(
-    rig: Rig,
+    test_rig: TestRig,
     name: str,
-    last: Sample,
-    samples: Sequence[Sample],
-    begun: JointAngles,
+    last: TickSample,
+    samples: Sequence[TickSample],
     longest_s: float,
     farthest_deg: float,
     advice: str = BRAKES,
-) -> Readings:
-    slow = [all(abs(sweep.velocity_rad_s) < REST_RAD_S for sweep, _ in sample.states.flippers) for sample in samples]
-    first = first_lasting(slow, REST_TICKS)
-    rest_s = PERIOD_S * ticks_until(None if first is None else samples[first], last)
-    yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, advice)
-    for flipper in rig.flippers:
-        index = rig.joints_of(flipper).start
-        path_deg = degrees(max(abs(sample.states[index].angle_rad - begun[index]) for sample in samples))
-        yield Reading(f"{name}: travel of the {flipper} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
+) -> BenchReadings:
+    """`last` is the sample before the request."""
+    speeds_rad_s, paths_rad = signals(samples, "velocity_rad_s"), signals(samples, "angle_rad")
+    paths_rad -= measured_angles(last.states)
+    resting = first_lasting(samples, np.all(np.abs(speeds_rad_s[:, ::2]) < REST_RAD_S, axis=1), REST_TICKS)
+    rest_s = PERIOD_S * ticks_until(resting, last)
+    yield BenchReading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, advice)
+    paths_deg = np.degrees(np.max(np.abs(paths_rad[:, ::2]), axis=0))
+    for flipper, path_deg in zip(test_rig.configuration.rig.flippers, paths_deg.tolist(), strict=True):
+        yield BenchReading(f"{name}: travel of the {flipper} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
 
 
-def ticks_until(sample: Sample | None, last: Sample) -> float:
+def ticks_until(sample: TickSample | None, last: TickSample) -> float:
     """Count ticks from the last one before the request, with missed ones; NaN where it never happened."""
     return nan if sample is None else sample.tick.number - last.tick.number

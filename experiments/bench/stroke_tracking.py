@@ -4,8 +4,9 @@ The lag is the shift with the best fit of the measured to the commanded angle (n
 means, and a parabola through the best three ticks), so a constant error is no lag. It is negative where a joint leads.
 """
 
-from collections.abc import Sequence
-from math import degrees, radians
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from math import degrees, fsum, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from control.records import FlipperJoints, JointAngles, Rig, same_for_each
 from experiments.bench.lateness import BUSY
-from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Sample, TestRig
+from experiments.bench.reading import BenchReading, BenchReadings
+from experiments.bench.test_rig import TestRig, TickSample, signals
 from experiments.robot.bench_errors import BenchError
 
 Vector = NDArray[np.float64]
@@ -59,16 +60,25 @@ def _correlation(commanded: Vector, measured: Vector, lag: int) -> float:
         return float(np.corrcoef(a, b)[0, 1])
 
 
-def slope_by_velocity(angles_rad: Vector, velocities_rad_s: Vector, times_s: Vector) -> float:
-    """Return the slope of the angle divided by the reported velocity, by least squares over SLOPE_TICKS at a time."""
-    steps_rad = 0.5 * (velocities_rad_s[1:] + velocities_rad_s[:-1]) * np.diff(times_s)
-    integrals_rad = np.concatenate(([0.0], np.cumsum(steps_rad)))
-    turned_rad, reported_rad = (each[SLOPE_TICKS:] - each[:-SLOPE_TICKS] for each in (angles_rad, integrals_rad))
-    size = float(np.dot(reported_rad, reported_rad))
-    return float(np.dot(turned_rad, reported_rad)) / size if size else float("nan")
+def velocity_scale(stretches: Iterable[Sequence[TickSample]], index: int) -> float:
+    """Return the turned angle divided by the integral of the reported velocity, by least squares over stretches.
+
+    It is 0 where nothing turned.
+    """
+    products = squares = 0.0
+    for stretch in stretches:
+        states = [sample.states[index] for sample in stretch]
+        turned_rad = states[-1].angle_rad - states[0].angle_rad
+        reported_rad = fsum(
+            (a.velocity_rad_s + b.velocity_rad_s) / 2.0 * (b.angle_stamp_s - a.angle_stamp_s)
+            for a, b in pairwise(states)
+        )
+        products += turned_rad * reported_rad
+        squares += reported_rad * reported_rad
+    return products / squares if squares else 0.0
 
 
-def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: float) -> Readings:
+def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: float) -> BenchReadings:
     """Check a motion of all joints to and fro about level. The robot is idle before and after."""
     front: JointAngles = same_for_each(*STROKE, test_rig.configuration.rig)
     back = front.map(lambda angle_rad: -angle_rad)
@@ -81,33 +91,31 @@ def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: flo
         yield from _velocity_readings(test_rig.configuration.rig, samples)
 
 
-def _velocity_readings(rig: Rig, samples: Sequence[Sample]) -> Readings:
+def _velocity_readings(rig: Rig, samples: Sequence[TickSample]) -> BenchReadings:
     """Compare each reported velocity with the slope of the reported angle: its scale may be another firmware's."""
     low, high = 1.0 - SLOPE_FRACTION, 1.0 + SLOPE_FRACTION
     advice = "its velocity has another scale than its angle: correct velocity_range_rad_s or the drive's own setting"
+    stretches = [samples[i : i + SLOPE_TICKS + 1] for i in range(len(samples) - SLOPE_TICKS)]
     for index, joint in enumerate(rig.joints):
-        states = [sample.states[index] for sample in samples]
-        angles_rad, velocities_rad_s, times_s = (
-            np.array([getattr(state, name) for state in states])
-            for name in ("angle_rad", "velocity_rad_s", "angle_stamp_s")
-        )
-        slope = slope_by_velocity(angles_rad, velocities_rad_s, times_s)
-        yield Reading(f"{joint}: slope of its angle by its velocity", slope, "1", low, high, advice)
+        what = f"{joint}: slope of its angle by its velocity"
+        yield BenchReading(what, velocity_scale(stretches, index), "1", low, high, advice)
 
 
-def _tracking_readings(rig: Rig, motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:
-    aimed = [(sample.aim, sample.states) for sample in samples if sample.aim is not None]
-    for index, joint in enumerate(rig.joints):
-        aims_rad = np.array([aim[index].angle_rad for aim, _ in aimed])
-        angles_rad = np.array([states[index].angle_rad for _, states in aimed])
-        errors_rad, lag_ms = aims_rad - angles_rad, 1e3 * PERIOD_S * lag_ticks(aims_rad, angles_rad)
-        max_deg, rms_deg = degrees(np.abs(errors_rad).max()), degrees(np.sqrt(np.mean(errors_rad**2)))
-        yield Reading(f"{joint}: {motion}, largest error", max_deg, "deg", 0.0, most_deg, advice)
-        yield Reading(f"{joint}: {motion}, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, advice)
-        yield Reading(f"{joint}: {motion}, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
+def _tracking_readings(
+    rig: Rig, motion: str, samples: Sequence[TickSample], most_deg: float, advice: str
+) -> BenchReadings:
+    aimed = [sample for sample in samples if sample.aim is not None]
+    aims_rad = np.array([[target.angle_rad for target in sample.aim or ()] for sample in aimed])
+    angles_rad = signals(aimed, "angle_rad")
+    for joint, aim_rad, angle_rad in zip(rig.joints, aims_rad.T, angles_rad.T, strict=True):
+        errors_deg, lag_ms = np.degrees(aim_rad - angle_rad), 1e3 * PERIOD_S * lag_ticks(aim_rad, angle_rad)
+        max_deg, rms_deg = np.abs(errors_deg).max(), np.sqrt(np.mean(errors_deg**2))
+        yield BenchReading(f"{joint}: {motion}, largest error", max_deg, "deg", 0.0, most_deg, advice)
+        yield BenchReading(f"{joint}: {motion}, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, advice)
+        yield BenchReading(f"{joint}: {motion}, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
 
 
-def check_strides(test_rig: TestRig) -> Readings:
+def check_strides(test_rig: TestRig) -> BenchReadings:
     """Check ten strides of the robot's own gait. The robot is idle before and after."""
     with test_rig.flippers_raised():
         missed = test_rig.loop.missed_ticks
@@ -120,8 +128,8 @@ def check_strides(test_rig: TestRig) -> Readings:
         overruled = {FaultKind.WATCHDOG_UNKNOWN} if test_rig.forced else set()
         reported = [fault.message for fault in test_rig.loop.faults.present if fault.kind not in overruled]
     yield from _walk_readings(test_rig, [sample for sample in samples if sample.mode is Mode.WALKING])
-    yield Reading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
-    yield Reading("walk: faults at its end", len(reported), "", 0, 0, " ".join(reported))
+    yield BenchReading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
+    yield BenchReading("walk: faults at its end", len(reported), "", 0, 0, " ".join(reported))
 
 
 def order_strides(test_rig: TestRig, count: int) -> None:
@@ -131,16 +139,16 @@ def order_strides(test_rig: TestRig, count: int) -> None:
         raise BenchError(f"The robot does not walk: {refused}")
 
 
-def _walk_readings(test_rig: TestRig, walked: Sequence[Sample]) -> Readings:
+def _walk_readings(test_rig: TestRig, walked: Sequence[TickSample]) -> BenchReadings:
     limited = 100.0 * sum(sample.limited for sample in walked) / len(walked)
     narrow = "see that nothing meets the flippers; else widen [limits] or slow down the gait: the torque was cut"
-    yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_FRACTION, narrow)
+    yield BenchReading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_FRACTION, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
-    yield Reading("walk: largest torque", most_nm, "N·m", 0.0, test_rig.configuration.limits.torque_nm, narrow)
+    yield BenchReading("walk: largest torque", most_nm, "N·m", 0.0, test_rig.configuration.limits.torque_nm, narrow)
     rig, worse = test_rig.configuration.rig, "compare with the strokes before: mechanics or gains"
     yield from _tracking_readings(rig, "walk", walked, WALK_DEG, worse)
-    spans = zip(rig.joints, test_rig.configuration.joint_ranges, strict=True)
-    for index, (joint, span) in enumerate(spans):
-        angles = [sample.states[index].angle_rad for sample in walked]
-        room_deg = degrees(min(span.max_rad - max(angles), min(angles) - span.min_rad))
-        yield Reading(f"{joint}: walk, room to the limits", room_deg, "deg", 1.0, 180.0, "widen [limits] or sweep less")
+    angles_rad = signals(walked, "angle_rad")
+    for index, (joint, span) in enumerate(zip(rig.joints, test_rig.configuration.joint_ranges, strict=True)):
+        room_rad = min(span.max_rad - angles_rad[:, index].max(), angles_rad[:, index].min() - span.min_rad)
+        what, widen = f"{joint}: walk, room to the limits", "widen [limits] or sweep less"
+        yield BenchReading(what, degrees(room_rad), "deg", 1.0, 180.0, widen)

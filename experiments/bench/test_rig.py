@@ -7,7 +7,10 @@ the held pose in HOLD may be replaced: by another path, or by a hold law of the 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import compress
-from typing import NamedTuple
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from control.controller import HoldLaw, measured_angles
 from control.faults import Fault, FaultKind, Reaction
@@ -28,7 +31,7 @@ POLL_S = 0.1  # interval at which a prompt is checked for an answer
 IDLE_COMMANDS = 5  # to each drive, in case some are lost
 
 
-class Sample(NamedTuple):
+class TickSample(NamedTuple):
     """One tick."""
 
     tick: Tick
@@ -37,6 +40,11 @@ class Sample(NamedTuple):
     aim: JointTargets | None  # commanded before the states were measured
     sent_nm: Torques  # in this tick
     limited: bool  # a limit cut the torque of this tick
+
+
+def signals(samples: Sequence[TickSample], name: str) -> NDArray[np.float64]:
+    """Return one signal of the states: a row for each tick, a column for each joint."""
+    return np.array([[getattr(state, name) for state in sample.states] for sample in samples])
 
 
 class TestRig:
@@ -51,32 +59,40 @@ class TestRig:
         self.loop = rig.loop
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller
+        self.level: JointAngles = same_for_all(0.0, self.configuration.rig)
         self._rest = self.level  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
         self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.knows_watchdog]
         self.forced = ""  # the operator allows torque without a known watchdog
 
-    def tick(self) -> Sample:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.force_idle()
+        self.rig.close()
+
+    def tick(self) -> TickSample:
         aim, loop = self.controller.joint_targets, self.loop
         tick, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(tick)
         self._update_lateness(torque_on, tick, loop.states)
-        return Sample(tick, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
+        return TickSample(tick, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
-    def run_for(self, duration_s: float) -> list[Sample]:
+    def run_for(self, duration_s: float) -> list[TickSample]:
         """Raises BenchError where a fault removes or limits the torque."""
         return [self.tick_checked() for _ in range(round(duration_s / PERIOD_S))]
 
-    def tick_checked(self) -> Sample:
+    def tick_checked(self) -> TickSample:
         sample, fault = self.tick(), self.loop.faults.worst
         if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
             raise BenchError(f"{fault.name}: {_advice([fault])}")
         return sample
 
-    def run_until(self, done: Callable[[Sample], bool], longest_s: float, what: str) -> list[Sample]:
+    def run_until(self, done: Callable[[TickSample], bool], longest_s: float, what: str) -> list[TickSample]:
         """Run until `done` accepts a sample. Raises BenchError after the longest time, and for a fault."""
-        samples: list[Sample] = []
+        samples: list[TickSample] = []
         for _ in range(round(longest_s / PERIOD_S)):
             samples.append(self.tick_checked())
             if done(samples[-1]):
@@ -87,7 +103,7 @@ class TestRig:
         """Run the loop while the operator is asked, so that no frame waits and the drives stay idle."""
         self.run_for(POLL_S)
 
-    def tick_silently(self, others: Sequence[tuple[CanPort, Frame]] = ()) -> Sample:
+    def tick_silently(self, others: Sequence[tuple[CanPort, Frame]] = ()) -> TickSample:
         """Read the drives for one tick and send nothing but the frames of `others`, as another program would.
 
         Drives that answer only when asked are asked, where that commands nothing and feeds no watchdog.
@@ -100,7 +116,7 @@ class TestRig:
         for axis in asked:
             axis.poll()
         self._update_lateness(self._torque_on() and len(asked) == len(states), tick, states)
-        return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
+        return TickSample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _torque_on(self) -> bool:
         """Return whether a drive reported closed loop before this tick, in any mode of the loop."""
@@ -166,7 +182,7 @@ class TestRig:
 
     def move(
         self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: HoldLaw | None = None
-    ) -> list[Sample]:
+    ) -> list[TickSample]:
         """Move in HOLD along a smooth path to its end."""
         self.controller.hold_law = law
         self.controller.follow_path(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
@@ -175,10 +191,6 @@ class TestRig:
     def index_of(self, joint: str) -> int:
         """Return the place of a joint in the records of this rig."""
         return self.configuration.rig.joints.index(joint)
-
-    @property
-    def level(self) -> JointAngles:
-        return same_for_all(0.0, self.configuration.rig)
 
     def raise_flippers(self) -> None:
         """Arm, and raise the flippers until they are level and straight out."""
@@ -232,9 +244,13 @@ class TestRig:
         self.drives.force_idle(IDLE_COMMANDS)
 
 
-def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
-    """Return the index of the first of `ticks` true flags in a row; a single one may be noise or a turning point."""
-    return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
+def first_lasting(
+    samples: Sequence[TickSample], flags: Sequence[bool] | NDArray[np.bool_], ticks: int
+) -> TickSample | None:
+    """Return the first of `ticks` samples in a row whose flag is true; a single one may be noise or a turning point."""
+    return next(
+        (sample for first, sample in enumerate(samples[: 1 - ticks]) if all(flags[first : first + ticks])), None
+    )
 
 
 def torque_on(held: Torques, index: int, torque_nm: float) -> Torques:

@@ -14,7 +14,9 @@ time-out. Where the time-out cannot be read, the torque must be gone after the l
 
 from collections.abc import Sequence
 from datetime import date
-from math import fsum, inf, isnan, nan
+from math import inf, isnan, nan
+
+import numpy as np
 
 from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Torques
@@ -22,8 +24,8 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth
 from drivers.drive_types import type_of
-from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.test_rig import Sample, TestRig, first_lasting
+from experiments.bench.reading import BenchReading, BenchReadings, left_out
+from experiments.bench.test_rig import TestRig, TickSample, first_lasting, signals
 from firmware_host.configuration.configuration import Configuration
 
 PRESSING_NM = 0.08  # down, twice the weight of an arm; none for a sweep joint, which would move
@@ -44,11 +46,11 @@ def press(held: Torques, states: DriveStates) -> Torques:
 Others = Sequence[tuple[CanPort, Frame]]  # frames of another program in every tick, and their ports
 
 
-def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[Sample], list[Sample]]:
+def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[TickSample], list[TickSample]]:
     """Return the samples with torque, and those after the last command."""
     test_rig.arm(press)
     pressed = test_rig.run_for(PRESSING_S)
-    silence: list[Sample] = []
+    silence: list[TickSample] = []
     for _ in range(round((test_rig.configuration.faults.longest_watchdog_s + PATIENCE_S) / PERIOD_S)):
         silence.append(test_rig.tick_silently(others))
         if not any(state.closed_loop for sample in silence[-GONE_TICKS:] for state in sample.states):
@@ -57,7 +59,7 @@ def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[Sam
     return pressed, silence
 
 
-def check_watchdog_times(test_rig: TestRig) -> Readings:
+def check_watchdog_times(test_rig: TestRig) -> BenchReadings:
     if not all(_asked_by_command(test_rig)):
         fed = "set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
         yield from _observed_readings(test_rig, "after the last command", fed)
@@ -93,7 +95,7 @@ def _asked_by_command(test_rig: TestRig) -> list[bool]:
     return [axis.parameters.asking_ends_torque for axis in test_rig.drives.axes]
 
 
-def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others = ()) -> Readings:
+def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others = ()) -> BenchReadings:
     """Let the watchdogs trip and watch the reports of the drives that need not be asked by a command."""
     pressed, silence = let_watchdogs_trip(test_rig, others)
     for index, (health, by_command) in enumerate(zip(test_rig.drives.health, _asked_by_command(test_rig), strict=True)):
@@ -104,14 +106,14 @@ def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others
         latest_s, todo = gone_s + drive.heartbeat_period_s, advice.format(joint=joint)
         first_idle = (sample for sample in silence if not sample.states[index].closed_loop)
         idle_s = next((sample.tick.now_s - pressed[-1].tick.now_s for sample in first_idle), nan)
-        yield Reading(f"{joint}: idle {when}", idle_s, "s", earliest_s, latest_s, todo)
+        yield BenchReading(f"{joint}: idle {when}", idle_s, "s", earliest_s, latest_s, todo)
         if "adduction" in joint and not others:
-            flowed_a = fsum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
-            low = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
-            first = first_lasting(low, GONE_TICKS)
-            seen_s = nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s
+            flowed_a = np.mean(signals(pressed[-40:], "current_a")[:, index])
+            low = signals(silence, "current_a")[:, index] / flowed_a < GONE_FRACTION
+            first = first_lasting(silence, low, GONE_TICKS)
+            seen_s = nan if first is None else first.tick.now_s - pressed[-1].tick.now_s
             latest_s = latest_s if drive.holds_idle_current else gone_s
-            yield Reading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
+            yield BenchReading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
 
 
 def _longest_s(test_rig: TestRig) -> float:
@@ -120,7 +122,9 @@ def _longest_s(test_rig: TestRig) -> float:
     return max(unknown_s if isnan(health.watchdog_s) else health.watchdog_s for health in test_rig.drives.health)
 
 
-def _asked_readings(test_rig: TestRig, silence_s: float, energised: bool, when: str, others: Others = ()) -> Readings:
+def _asked_readings(
+    test_rig: TestRig, silence_s: float, energised: bool, when: str, others: Others = ()
+) -> BenchReadings:
     """Ask the drives that must be asked by a command, after a silence, whether they still have torque."""
     before, answers = ask_after_silence(test_rig, silence_s, others)
     for index, (joint, drive) in enumerate(test_rig.configuration.drive.items()):
@@ -129,11 +133,11 @@ def _asked_readings(test_rig: TestRig, silence_s: float, energised: bool, when: 
         what, advice = f"{silence_s:.2f} s {when}", f"set the watchdog of {joint}; see the guide of its type of drive"
         if drive.reports_settings:
             status = float(answers[index].closed_loop)
-            yield Reading(f"{joint}: in closed loop {what}", status, "", energised, energised, advice)
+            yield BenchReading(f"{joint}: in closed loop {what}", status, "", energised, energised, advice)
         if "adduction" in joint:
             fraction = answers[index].current_a / before[index].current_a
             low, high = (GONE_FRACTION, inf) if energised else (-inf, GONE_FRACTION)
-            yield Reading(f"{joint}: part of its current {what}", fraction, "", low, high, advice)
+            yield BenchReading(f"{joint}: part of its current {what}", fraction, "", low, high, advice)
         elif not drive.reports_settings:  # no torque can be held on a joint that swings freely
             yield left_out(f"{joint}: part of its current {what}")
 
@@ -151,7 +155,7 @@ def ask_after_silence(test_rig: TestRig, silence_s: float, others: Others = ()) 
     return before, answered.states
 
 
-def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
+def check_what_feeds_watchdogs(test_rig: TestRig) -> BenchReadings:
     drives = test_rig.configuration.drive.values()
     harmless = [(test_rig.drives.ports[drive.bus], type_of(drive).harmless_frames(drive.node_id)) for drive in drives]
     for kind in dict.fromkeys(kind for _, frames in harmless for kind in frames):
@@ -175,7 +179,7 @@ def clear(test_rig: TestRig) -> Sequence[DriveHealth]:
     return reported
 
 
-def _reasons(test_rig: TestRig) -> Readings:
+def _reasons(test_rig: TestRig) -> BenchReadings:
     """Check the reason that the drives report, and clear it."""
     readable = [drive.reports_settings for drive in test_rig.configuration.drive.values()]
     for health, can_report in zip(clear(test_rig), readable, strict=True):
@@ -183,4 +187,4 @@ def _reasons(test_rig: TestRig) -> Readings:
             yield left_out(f"{health.joint}: switched off by its watchdog")
             continue
         advice = f"the drive reports {health.errors or 'no reason'}, not its watchdog: see the watchdog in stage 1"
-        yield Reading(f"{health.joint}: switched off by its watchdog", health.watchdog_expired, "", 1, 1, advice)
+        yield BenchReading(f"{health.joint}: switched off by its watchdog", health.watchdog_expired, "", 1, 1, advice)

@@ -4,10 +4,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from control.rate import PERIOD_S
 from experiments.bench.measured_check import measure_check
 from experiments.bench.test_rig import TestRig
-from experiments.bench.wiring_check import ASKING_S, CHECKS
+from experiments.bench.wiring_check import CHECKS, ask_drives
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 
@@ -20,12 +19,9 @@ def identify_drives(test_rig: TestRig) -> Identities:
     for check in CHECKS:
         if problem := measure_check(test_rig, check).problem:
             raise BenchError(problem)
-    numbered = [drive.reports_settings and drive.serial_digits for drive in test_rig.configuration.drive.values()]
-    for _ in range(round(ASKING_S / PERIOD_S)):
-        health = {each.joint: each for each in test_rig.drives.health}
-        if all(each.serial_number or not own for each, own in zip(health.values(), numbered, strict=True)):
-            break
-        test_rig.tick_checked()
+    numbered = {joint for joint, drive in test_rig.configuration.drive.items() if drive.serial_digits}
+    asked = ask_drives(test_rig, lambda health: bool(health.serial_number) or health.joint not in numbered)
+    health = {each.joint: each for each in asked}
     return {
         joint: {
             "bus": drive.bus,

@@ -5,23 +5,23 @@ No motor has torque meanwhile, so a wrong sign or zero moves nothing. Angles are
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from itertools import pairwise
-from math import ceil, degrees, floor, fsum, pi, radians
+from itertools import chain
+from math import ceil, degrees, floor, pi, radians
 from statistics import fmean
-from typing import Any, Protocol
+from typing import Any
 
-from control.controller import measured_angles
-from control.records import DriveStates
-from experiments.bench.test_rig import POLL_S, Sample, TestRig
+import numpy as np
+
+from experiments.bench.stroke_tracking import velocity_scale
+from experiments.bench.test_rig import POLL_S, TestRig, TickSample, signals
 from experiments.calibration.joint_picture import draw_joint
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.steps import OperatorStep
 from experiments.study.notebook import Entry
 from experiments.study.prompt import GO_ON, REDO, Operator
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import END_STOPS_RAD
 
 ENDS = {
     "sweep": ("forward to its front stop", "back to its rear stop"),
@@ -37,26 +37,13 @@ ROOM_DEG = 1.0  # of a limit to the stop
 DIGITS = 5  # of a turn
 
 
-class Hand(Protocol):
-    """What moves the flippers: an operator, who needs no call, or a simulated hand."""
-
-    @property
-    def is_turning(self) -> bool: ...
-
-    def hold(self, angles_rad: Sequence[float]) -> None: ...
-
-    def turn(self, index: int, angle_rad: float) -> None: ...
-
-    def release(self) -> None: ...
-
-
 class HandSteps:
     """Owns the samples of the prompt that is awaited."""
 
-    def __init__(self, test_rig: TestRig, operator: Operator, hand: Hand) -> None:
-        self._test_rig, self._operator, self._hand = test_rig, operator, hand
+    def __init__(self, test_rig: TestRig, operator: Operator) -> None:
+        self._test_rig, self._operator, self._hand = test_rig, operator, test_rig.operator.hand
         self._rig = test_rig.configuration.rig
-        self._stretches: list[list[Sample]] = []  # without a gap within each
+        self._stretches: list[list[TickSample]] = []  # without a gap within each
         self._tries: Counter[str] = Counter()
 
     def steps(self, joints: Sequence[str]) -> list[OperatorStep]:
@@ -72,7 +59,7 @@ class HandSteps:
         return level + ends
 
     def _ask_level(self, flipper: str) -> str:
-        self._hand.hold([0.0] * len(self._rig.joints))
+        self._hand.hold()
         what = f"Hold the {flipper} flipper straight out to the side and level, and keep it there."
         return self._ask(flipper, what, BEFORE)
 
@@ -85,7 +72,7 @@ class HandSteps:
 
     def _ask_front(self, joint: str) -> str:
         self._stretches = []
-        self._hand.hold([0.0] * len(self._rig.joints))
+        self._hand.hold()
         return self._turn(joint, 0)
 
     def _read_ends(self, joint: str) -> Entry | None:
@@ -104,8 +91,8 @@ class HandSteps:
 
     def _turning_problem(self, joint: str, turned_rad: float) -> str:
         """Return why the motion is not that of the joint from stop to stop; empty where it is."""
-        paths_rad = [max(each) - min(each) for each in zip(*map(measured_angles, self._states()), strict=True)]
-        paths = dict(zip(self._rig.joints, paths_rad, strict=True))
+        paths_rad = np.ptp(signals([*chain(*self._stretches)], "angle_rad"), axis=0)
+        paths = dict(zip(self._rig.joints, paths_rad.tolist(), strict=True))
         other = max(paths, key=lambda each: paths[each])
         if other != joint and paths[other] > LEAST_TURN_RAD:
             return (
@@ -125,10 +112,8 @@ class HandSteps:
         return None
 
     def _turn(self, joint: str, end: int) -> str:
-        index, kind = self._rig.joints.index(joint), joint.partition("_")[2]
-        stop_rad = END_STOPS_RAD[index % 2]
-        self._hand.turn(index, -stop_rad if end else stop_rad)
-        flipper = joint.partition("_")[0]
+        self._hand.turn(joint, -1.0 if end else 1.0)
+        flipper, kind = joint.split("_")
         what = f"Move the {flipper} flipper slowly {ENDS[kind][end]}, hold it there, and turn nothing else."
         return self._ask(joint, what, AGAIN if end else BEFORE)
 
@@ -142,15 +127,12 @@ class HandSteps:
     def _watch(self) -> None:
         self._stretches.append(self._test_rig.run_for(POLL_S))
 
-    def _states(self) -> Iterator[DriveStates]:
-        return (sample.states for stretch in self._stretches for sample in stretch)
-
     def _angle_at_rest(self, joint: str) -> float | None:
         """Return nothing where the joint moves."""
         index = self._rig.joints.index(joint)
         self._stretches.append(self._test_rig.run_for(STILL_S))
-        angles_rad = [sample.states[index].angle_rad for sample in self._stretches[-1]]
-        return None if max(angles_rad) - min(angles_rad) > STILL_RAD else fmean(angles_rad)
+        angles_rad = signals(self._stretches[-1], "angle_rad")[:, index]
+        return None if np.ptp(angles_rad) > STILL_RAD else fmean(angles_rad)
 
 
 def level_key(flipper: str) -> str:
@@ -159,21 +141,6 @@ def level_key(flipper: str) -> str:
 
 def ends_key(joint: str) -> str:
     return f"{joint}: ends"
-
-
-def velocity_scale(stretches: Sequence[Sequence[Sample]], index: int) -> float:
-    """Return the turned angle divided by the integral of the reported velocity, by least squares over stretches."""
-    products = squares = 0.0
-    for stretch in stretches:
-        states = [sample.states[index] for sample in stretch]
-        turned_rad = states[-1].angle_rad - states[0].angle_rad
-        reported_rad = fsum(
-            (a.velocity_rad_s + b.velocity_rad_s) / 2.0 * (b.angle_stamp_s - a.angle_stamp_s)
-            for a, b in pairwise(states)
-        )
-        products += turned_rad * reported_rad
-        squares += reported_rad * reported_rad
-    return products / squares if squares else 0.0
 
 
 def stops_deg(entries: Mapping[str, Entry], joint: str) -> tuple[float, float]:

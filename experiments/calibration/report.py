@@ -9,8 +9,7 @@ from typing import Any
 from pandas import DataFrame
 
 from experiments.actuator.fit import JointFit
-from experiments.actuator.plan import Plan
-from experiments.actuator.report import Readings, make_result
+from experiments.actuator.plan import WeighingPlan
 from experiments.calibration.drive_identities import Identities
 from experiments.calibration.hand_steps import ends_key, stops_deg
 from experiments.calibration.torque_steps import torque_key
@@ -28,7 +27,9 @@ TORQUE = "Each joint answered a tiny torque alone, in its direction, and with th
 WEIGHT_FRACTION = 0.1  # of the arm's configured weight: more is written
 
 
-def arm_changes(configuration: Configuration, plan: Plan, fits: Sequence[JointFit]) -> dict[tuple[str, ...], Any]:
+def arm_changes(
+    configuration: Configuration, plan: WeighingPlan, fits: Sequence[JointFit]
+) -> dict[tuple[str, ...], Any]:
     """Return the mass of the arm by its tare while it swings in air, where that is not the configured one."""
     arm = configuration.arm
     lifted_nm = [fit.numbers["lifted_nm"] for fit in fits if fit.numbers["joint"].endswith("adduction")]
@@ -45,13 +46,11 @@ def report_calibration(
     drives: Identities,
     entries: Mapping[str, Entry],
     corrected: Configuration,
-    weighed: tuple[Plan, Readings, Sequence[JointFit]],
-    applied: str,
-    simulated: bool,
+    joints: Sequence[str],
+    weighed: Result,
 ) -> Result:
-    joints = weighed[0].joints
+    """Return the result of the weights with what was found before them."""
     begun = entries["begun"]
-    weights = make_result(*weighed, applied, simulated)
     found = [{"joint": joint, **drives[joint]} for joint in joints]
     hands = [_hand_row(joint, entries, corrected) for joint in joints]
     torques = [
@@ -73,11 +72,11 @@ def report_calibration(
     title = f"Calibration of {corrected.robot.name} by {begun['operator']}, {begun['date']}"
     numbers = {**begun, "robot": corrected.robot.name, "drives": drives, "hands": hands, "torques": torques}
     return replace(
-        weights,
+        weighed,
         title=title,
-        tables=[*tables, *weights.tables],
-        texts={"Signs, zeros, ranges, velocity": HANDS, "Torque": TORQUE, **weights.texts},
-        summary={**numbers, **weights.summary},
+        tables=[*tables, *weighed.tables],
+        texts={"Signs, zeros, ranges, velocity": HANDS, "Torque": TORQUE, **weighed.texts},
+        summary={**numbers, **weighed.summary},
         files=FILES,
     )
 

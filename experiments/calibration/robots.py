@@ -7,23 +7,22 @@ not let go while a disk or a terminal stalls, so they use a daemon, which this p
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
-from experiments.actuator.bench import RobotBench, SimulatedBench
+from experiments.actuator.bench import attended, weigh_on_robot, weigh_simulated
 from experiments.actuator.file_change import Changes, changed_text
-from experiments.actuator.plan import Plan
+from experiments.actuator.plan import WeighingPlan
 from experiments.actuator.report import Readings
 from experiments.actuator.simulation import BuiltRobot
-from experiments.bench.operator import PromptedBenchOperator
+from experiments.bench.operator import BenchOperator, Hand
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
 from experiments.bench.simulated_hand import SimulatedHand
 from experiments.bench.test_rig import TestRig
-from experiments.calibration.hand_steps import Hand
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.study.session import Session
@@ -37,49 +36,42 @@ STARTING_S, ENDING_S, POLL_S = 10.0, 20.0, 0.1
 FILE = "mudskipper.toml"  # of the daemon that holds the weights
 
 
-class OpenedRobot(NamedTuple):
-    test_rig: TestRig
-    hand: Hand
-
-
-class CalibratedRobot(Protocol):
-    def open(self, configuration: Configuration) -> AbstractContextManager[OpenedRobot]:
-        """Open the robot's buses, with a loop that believes in a configuration. Raises BenchError."""
-
-    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
-        """Return the readings of the weights, and the logs."""
-
-
-class OperatorsHand:
-    """The hand of a person, who turns the joint before answering."""
-
-    is_turning = False
-
-    def hold(self, angles_rad: Sequence[float]) -> None: ...
-
-    def turn(self, index: int, angle_rad: float) -> None: ...
-
-    def release(self) -> None: ...
-
-
 @dataclass(frozen=True)
-class RealRobot:
+class CalibratedRobot:
+    """A real robot, or where it was `built` otherwise than configured a simulated one."""
+
     session: Session
+    built: BuiltRobot | None = None
+    seed: int = 1
+    practises: bool = False  # a person answers the prompts, and the simulated hands do what they ask for
 
     @contextmanager
-    def open(self, configuration: Configuration) -> Iterator[OpenedRobot]:
-        with _test_rig(HardwareRig(configuration), self.session) as test_rig:
-            for warning in test_rig.rig.warnings:
+    def open(self, configuration: Configuration) -> Iterator[TestRig]:
+        """Open the robot's buses, with a loop that believes in a configuration. Raises BenchError."""
+        rig: Rig
+        if self.built is None:
+            rig, hand = HardwareRig(configuration), Hand()
+        else:
+            built, constant_nm_a = self.built
+            drives = {
+                joint: replace(drive, torque_constant_error=constant_nm_a / drive.torque_constant_nm_a - 1.0)
+                for joint, drive in on_blocks(built).drives(built).items()
+            }
+            rig = SimulatedRig(configuration, built, drives, self.seed)
+            hand = SimulatedHand(rig)
+        with TestRig(rig, BenchOperator(self.session.operator, hand)) as test_rig:
+            for warning in rig.warnings:
                 self.session.operator.report(f"warning: {warning}")
-            yield OpenedRobot(test_rig, OperatorsHand())
+            yield test_rig
 
-    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+    def weigh(self, configuration: Configuration, plan: WeighingPlan) -> tuple[Readings, list[Path]]:
+        """Return the readings of the weights, and the logs."""
+        if self.built is not None:
+            return weigh_simulated(configuration, plan, self.session, self.seed, self.built, self.practises)
         with running_daemon(configuration, self.session.folder) as socket:
-            bench = RobotBench(DaemonRobot(socket), self.session)
-            try:
-                readings = bench.calibrate(plan)
-            finally:
-                logs = bench.leave()
+            robot = DaemonRobot(socket)
+            with attended(robot, self.session) as logs:
+                readings = weigh_on_robot(robot, plan, self.session)
         return readings, logs
 
 
@@ -111,39 +103,6 @@ def _wait_for(daemon: subprocess.Popen[bytes], socket: Path, messages: Path) -> 
         time.sleep(POLL_S)
     reported = messages.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["it reports nothing"]
     raise BenchError(f"the daemon that holds the weights did not start: {reported[-1]}")
-
-
-@dataclass(frozen=True)
-class SimulatedRobot:
-    session: Session
-    built: BuiltRobot
-    seed: int
-    practises: bool = False  # a person answers the prompts, and the simulated hands do what they ask for
-
-    @contextmanager
-    def open(self, configuration: Configuration) -> Iterator[OpenedRobot]:
-        built, constant_nm_a = self.built
-        drives = {
-            joint: replace(drive, torque_constant_error=constant_nm_a / drive.torque_constant_nm_a - 1.0)
-            for joint, drive in on_blocks(built).drives(built).items()
-        }
-        rig = SimulatedRig(configuration, built, drives, self.seed)
-        with _test_rig(rig, self.session) as test_rig:
-            yield OpenedRobot(test_rig, SimulatedHand(rig))
-
-    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
-        bench = SimulatedBench(configuration, self.seed, self.session, self.built, self.practises)
-        return bench.calibrate(plan), bench.leave()
-
-
-@contextmanager
-def _test_rig(rig: Rig, session: Session) -> Iterator[TestRig]:
-    test_rig = TestRig(rig, PromptedBenchOperator(session.operator, sure=False))
-    try:
-        yield test_rig
-    finally:
-        test_rig.force_idle()
-        rig.close()
 
 
 def build_with_errors(configuration: Configuration, seed: int) -> BuiltRobot:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.strokes.origin_fit import NORMAL_MAD, student_factor
-from experiments.loadcell.force_trials import analyse_insertion, analyse_shear, wide_pace
+from experiments.loadcell.force_trials import analyse_insertion, analyse_shear
 from experiments.loadcell.measured_trials import analyse_measured
 from experiments.loadcell.stage_track import MEDIAN_ERROR, WIDE, common_alignment
 from experiments.loadcell.strokes import (
@@ -24,7 +24,6 @@ from experiments.loadcell.strokes import (
     AnalysedTrial,
     Coefficient,
     Pace,
-    Profile,
     Recorded,
     StageSettings,
     StrokeError,
@@ -55,33 +54,35 @@ class MudCoefficient(NamedTuple):
         return hypot(self.trials_error, self.shared_error)
 
 
-def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> list[AnalysedTrial]:
+def analyse(trials: Sequence[Recorded], show: Show) -> list[AnalysedTrial]:
     """Analyse all trials of one stage, the second time near their common values."""
     analysed = []
     for done, trial in enumerate(trials):
         show(done, len(trials))
-        analysed.append(analyse_trial(trial, settings, wide_pace(settings)))
+        analysed.append(analyse_trial(trial))
     common = common_alignment([trial.alignment for trial in analysed if trial.alignment is not None])
-    analysed = [_realigned(trial, common, settings) if trial.is_measured else trial for trial in analysed]
+    analysed = [_realigned(trial.recorded, common) if trial.is_measured else trial for trial in analysed]
     paces = [trial.pace for trial in analysed if trial.pace is not None]
     if len(paces) < 3:
         return analysed
-    pace, uncertainty = common_pace(paces, settings)
-    analysed = [analyse_trial(trial.recorded, settings, pace) if trial.pace else trial for trial in analysed]
-    return [replace(trial, shared_uncertainty=uncertainty) if trial.pace else trial for trial in analysed]
+    pace, uncertainty = common_pace(paces, trials[0].settings.speed_m_s)
+    return [
+        replace(analyse_trial(trial.recorded, pace), shared_uncertainty=uncertainty) if trial.pace else trial
+        for trial in analysed
+    ]
 
 
-def _realigned(trial: AnalysedTrial, common: Alignment, settings: StageSettings) -> AnalysedTrial:
+def _realigned(trial: Recorded, common: Alignment) -> AnalysedTrial:
     """Analyse again, and add the relative error from the lag that all trials share."""
-    again = analyse_trial(trial.recorded, settings, wide_pace(settings), common)
-    if again.alignment is None or again.speed_m_s is None or trial.recorded.kind == SHEAR:
+    again = analyse_trial(trial, aligned=common)
+    if again.alignment is None or again.speed_m_s is None or trial.kind == SHEAR:
         return again
     lag_s = min(common.lag_uncertainty_s, again.alignment.lag_uncertainty_s)
-    shared = SHIFT * again.speed_m_s * lag_s / settings.depth_m
+    shared = SHIFT * again.speed_m_s * lag_s / trial.settings.depth_m
     return replace(again, shared_uncertainty=hypot(again.shared_uncertainty, shared))
 
 
-def common_pace(paces: Sequence[Pace], settings: StageSettings) -> tuple[Pace, float]:
+def common_pace(paces: Sequence[Pace], set_m_s: float) -> tuple[Pace, float]:
     """Return the median of the trials' speeds and ramps with their scatter, and the uncertainty of the speed.
 
     The set speed counts as a measurement of its own, unless the trials contradict it; the uncertainty grows where
@@ -90,10 +91,10 @@ def common_pace(paces: Sequence[Pace], settings: StageSettings) -> tuple[Pace, f
     speeds, ramps, speed_errors, ramp_errors = zip(*paces, strict=True)
     speed, scatter = _common(speeds, speed_errors)
     error = MEDIAN_ERROR * max(stdev(speeds) / speed, median(speed_errors), LEAST_SPEED_UNCERTAINTY) / sqrt(len(paces))
-    apart = abs(speed / settings.speed_m_s - 1.0) / hypot(error, SET_SPEED_UNCERTAINTY)
+    apart = abs(speed / set_m_s - 1.0) / hypot(error, SET_SPEED_UNCERTAINTY)
     if apart < AGREEING:
         prior, own = 1.0 / SET_SPEED_UNCERTAINTY**2, 1.0 / error**2
-        speed = (prior * settings.speed_m_s + own * speed) / (prior + own)
+        speed = (prior * set_m_s + own * speed) / (prior + own)
         error = max(1.0, apart) / sqrt(prior + own)
     ramp, ramp_scatter = _common(ramps, ramp_errors)
     speed_uncertainty = max(LEAST_SPEED_UNCERTAINTY, scatter, error)
@@ -107,27 +108,20 @@ def _common(values: Sequence[float], uncertainties: Sequence[float]) -> tuple[fl
     return middle, sqrt(max(0.0, scatter**2 - median(uncertainties) ** 2))
 
 
-def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace, aligned: Alignment = WIDE) -> AnalysedTrial:
+def analyse_trial(trial: Recorded, expected: Pace | None = None, aligned: Alignment = WIDE) -> AnalysedTrial:
+    """Evaluate the positions, or the force alone where there are none or they do not show the stroke."""
+    remark = ""
     try:
         profile = find_contact(trial)
-    except StrokeError as problem:
-        return AnalysedTrial(trial, problem=str(problem))
-    if trial.positions is None:
-        return _analyse_by_force(trial, profile, settings, expected)
-    try:
-        return analyse_measured(trial, profile, settings, aligned)
+        if trial.positions is not None:
+            try:
+                return analyse_measured(trial, profile, aligned)
+            except (StrokeError, np.linalg.LinAlgError) as problem:
+                remark = f"the position is not used: {problem}"
+        analysed = analyse_shear(trial, profile) if trial.kind == SHEAR else analyse_insertion(trial, profile, expected)
     except (StrokeError, np.linalg.LinAlgError) as problem:
-        by_force = _analyse_by_force(trial, profile, settings, expected)
-        return replace(by_force, remark=f"the position is not used: {problem}")
-
-
-def _analyse_by_force(trial: Recorded, profile: Profile, settings: StageSettings, expected: Pace) -> AnalysedTrial:
-    try:
-        if trial.kind == SHEAR:
-            return analyse_shear(trial, profile, settings)
-        return analyse_insertion(trial, profile, settings, expected)
-    except (StrokeError, np.linalg.LinAlgError) as problem:
-        return AnalysedTrial(trial, problem=str(problem))
+        analysed = AnalysedTrial(trial, problem=str(problem))
+    return replace(analysed, remark=remark or analysed.remark)
 
 
 def bench_uncertainty(name: str, settings: StageSettings, depth_error_m: float, calibration_error: float) -> float:
@@ -162,8 +156,9 @@ def gather_trials(trials: Sequence[AnalysedTrial], name: str, bench: float) -> M
     )
 
 
-def speed_remark(pace: Pace, settings: StageSettings, bound: float = SPEED_BOUND) -> str:
-    ratio = pace.speed_m_s / settings.speed_m_s
-    if abs(ratio - 1.0) <= max(bound, 2.0 * pace.speed_uncertainty):
+def speed_remark(trial: AnalysedTrial, bound: float = SPEED_BOUND) -> str:
+    """Return a remark on a stage that did not move at the set speed, as far as the force shows its pace."""
+    set_m_s, pace = trial.recorded.settings.speed_m_s, trial.pace
+    if pace is None or abs(pace.speed_m_s / set_m_s - 1.0) <= max(bound, 2.0 * pace.speed_uncertainty):
         return ""
-    return f"the stage moved at {pace.speed_m_s:.3f} m/s, and {settings.speed_m_s:.3f} m/s was set: check both"
+    return f"the stage moved at {pace.speed_m_s:.3f} m/s, and {set_m_s:.3f} m/s was set: check both"

@@ -26,9 +26,7 @@ class CurveFit(NamedTuple):
     square: float  # sum of squared residuals of the samples, without those of the prior
 
 
-class Prior(NamedTuple):
-    means: Array
-    std_errors: Array  # infinite where nothing is known
+Prior = tuple[Array, Array]  # means and standard errors, infinite where nothing is known
 
 
 def fit_curve(
@@ -39,13 +37,15 @@ def fit_curve(
     `shapes` returns one column for each factor; `noise` is the standard deviation of a sample, which weighs the prior.
     """
 
+    means, prior_errors = prior
+
     def project(parameters: Array) -> tuple[Array, Array]:
         columns = shapes(parameters)
         factors = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=np.float64)
         return columns @ factors - y, factors
 
     def residuals(parameters: Array) -> Array:
-        return np.concatenate([project(parameters)[0], noise * (parameters - prior.means) / prior.std_errors])
+        return np.concatenate([project(parameters)[0], noise * (parameters - means) / prior_errors])
 
     def slopes(parameters: Array) -> Array:
         steps = DIFFERENCES * np.eye(len(parameters))

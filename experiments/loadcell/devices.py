@@ -13,11 +13,11 @@ from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder
 from drivers.serial.serial_line import SerialLineError
 from experiments.loadcell.preparation import OR_WITHOUT, CellSettings
-from experiments.loadcell.recording import CellRecorder, WallClock
-from experiments.loadcell.stage import ManualStage, SimulatedStage, Stage, water_of
-from experiments.loadcell.trials import TrialBench, TrialPlan
+from experiments.loadcell.recording import CellBench, WallClock
+from experiments.loadcell.stage import SimulatedStage, Stage, TrialPlan, water_of
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Notebook
+from experiments.study.prompt import AutomaticOperator
 from experiments.study.session import Session
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate
@@ -26,7 +26,7 @@ from simulation.test_rig.stage_motion import ManualMotionParameters
 
 
 @contextmanager
-def open_bench(session: Session, plan: TrialPlan, cell: CellSettings, notebook: Notebook) -> Iterator[TrialBench]:
+def open_bench(session: Session, plan: TrialPlan, cell: CellSettings, notebook: Notebook) -> Iterator[CellBench]:
     """Open the devices and close them in the end. Raises BenchError where one does not open."""
     with ExitStack() as devices:
         emulated = devices.enter_context(_emulated(plan, cell)) if cell.port is None else None
@@ -43,18 +43,19 @@ def open_bench(session: Session, plan: TrialPlan, cell: CellSettings, notebook: 
             encoder = devices.enter_context(closing(StageEncoder(encoder_settings))) if encoder_settings else None
         except SerialLineError as problem:
             raise BenchError(f"the stage's encoder: {problem}{otherwise}" if otherwise else str(problem)) from problem
-        recorder = CellRecorder(port, emulated or WallClock(), session.operator, encoder)
-        stage: Stage = ManualStage(plan.settings, recorder)
-        if emulated:
-            stage = SimulatedStage(plan.settings, emulated, plan.muds, cell.seed)
-        yield TrialBench(
-            recorder=recorder,
-            stage=stage,
+        bench = CellBench(
+            session=session,
             plan=plan,
             notebook=notebook,
-            folder=session.folder,
-            show=session.show,
+            port=port,
+            clock=emulated or WallClock(),
+            encoder=encoder,
         )
+        bench.stage = Stage(plan.settings, session.operator, bench.drain)
+        if emulated:
+            operator = session.operator if cell.practises else AutomaticOperator(lambda message: None)
+            bench.stage = SimulatedStage(plan.settings, operator, bench.drain, emulated, plan.muds, cell.seed)
+        yield bench
 
 
 @contextmanager
@@ -75,8 +76,8 @@ def _emulated(plan: TrialPlan, cell: CellSettings) -> Iterator[EmulatedBench]:
         yield emulated
 
 
-def describe_cell(recorder: CellRecorder) -> dict[str, Any]:
-    port, encoder = recorder.port, recorder.encoder
+def describe_cell(bench: CellBench) -> dict[str, Any]:
+    port, encoder = bench.port, bench.encoder
     position = encoder and asdict(encoder.settings) | {
         "counts": encoder.counts.accepted,
         "rate_hz": encoder.line.clock.rate_hz,

@@ -18,7 +18,7 @@ from math import hypot, inf, nan, sqrt
 
 import numpy as np
 
-from experiments.loadcell.curve_fit import Array, CurveFit, Prior, cheaper_fit, fit_curve
+from experiments.loadcell.curve_fit import Array, CurveFit, cheaper_fit, fit_curve
 from experiments.loadcell.strokes import (
     CONTACT_FRACTION,
     CONTACT_NOISES,
@@ -30,10 +30,10 @@ from experiments.loadcell.strokes import (
     AnalysedTrial,
     Coefficient,
     Pace,
+    PlateStroke,
     Profile,
     Recorded,
     StageSettings,
-    Stroke,
     StrokeError,
     fit_slope,
     is_off_curve,
@@ -57,22 +57,21 @@ KNOTS = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 3 / 4])  # of the chain, in depths
 FALLEN_FRACTION, LOW_S = 0.93, 0.2  # of a steady shear: the stage has stopped
 
 
-def wide_pace(settings: StageSettings) -> Pace:
-    """Return the prior before any measurement: about the set speed, with ramps from 0.2 to 20 m/s²."""
-    return Pace(settings.speed_m_s, 2.0, 0.15, 1.2)
+def analyse_insertion(trial: Recorded, profile: Profile, expected: Pace | None = None) -> AnalysedTrial:
+    """Raises StrokeError where the way down does not show the motion.
 
-
-def analyse_insertion(trial: Recorded, profile: Profile, settings: StageSettings, expected: Pace) -> AnalysedTrial:
-    """Raises StrokeError where the way down does not show the motion."""
-    times_s, depth_m = profile.times_s, settings.depth_m
-    fit, samples = _fit_descent(profile, depth_m, expected)
+    Without an `expected` pace the stage may have about the set speed, and ramps from 0.2 to 20 m/s².
+    """
+    times_s, settings = profile.times_s, trial.settings
+    depth_m = settings.depth_m
+    fit, samples = _fit_descent(profile, depth_m, expected or Pace(settings.speed_m_s, 2.0, 0.15, 1.2))
     begin_error_s, speed_error, ramp_error = fit.std_errors.tolist()
     pace = _limited_pace(fit.parameters, depth_m)._replace(
         speed_uncertainty=speed_error, acceleration_uncertainty=ramp_error
     )
     surface_s = float(fit.parameters[0] + times_s[profile.begin])
     level_n, rise_n, _, slowing_n, jump_n = fit.factors.tolist()
-    strokes = {"k_p": Stroke(surface_s, surface_s + pace.descent_s(depth_m), level_n)}
+    strokes = {"k_p": PlateStroke(surface_s, surface_s + pace.descent_s(depth_m), level_n)}
     depths_m, fractions = pace.descend(times_s - surface_s, depth_m)
     opposing_n = profile.forces_n - level_n - slowing_n * _slowing(depths_m, fractions)
     shift = SHIFT * pace.speed_m_s * begin_error_s / depth_m
@@ -81,12 +80,12 @@ def analyse_insertion(trial: Recorded, profile: Profile, settings: StageSettings
     if is_off_curve(profile, residual_n, jump_n + rise_n):
         remark = f"the force is {residual_n:.3f} N off the curve of a stage of one speed: the depth is uncertain"
     try:
-        up, out_error_s = find_extraction(profile, strokes["k_p"], pace, settings)
+        up, out_error_s = find_extraction(profile, strokes["k_p"], pace, depth_m)
         to_m = (1.0 - REVERSAL_FRACTION) * depth_m
         depths_m, _ = pace.descend(up.end_s - times_s, depth_m)
         uncertainty = hypot(SHIFT * pace.speed_m_s * out_error_s / to_m, pace.speed_uncertainty)
-        strokes["k_e"], opposing_n = up, up.level_n - profile.forces_n
-        k_e = fit_slope(settings, depths_m, opposing_n, to_m, uncertainty)
+        strokes["k_e"] = up
+        k_e = fit_slope(settings, depths_m, up.level_n - profile.forces_n, to_m, uncertainty)
     except StrokeError as problem:
         remark = str(problem)
     return AnalysedTrial(
@@ -109,12 +108,10 @@ def _fit_descent(profile: Profile, depth_m: float, expected: Pace) -> tuple[Curv
     t, y = times_s[window], profile.forces_n[window]
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
         raise StrokeError("fewer than 6 samples on the way down: use a faster amplifier or a slower stage")
-    prior = Prior(
-        np.array([0.0, np.log(expected.speed_m_s), np.log(expected.acceleration_m_s2)]),
-        np.array([np.inf, expected.speed_uncertainty, expected.acceleration_uncertainty]),
-    )
+    means = np.array([0.0, np.log(expected.speed_m_s), np.log(expected.acceleration_m_s2)])
+    prior = means, np.array([np.inf, expected.speed_uncertainty, expected.acceleration_uncertainty])
     shifts = STARTS if expected.speed_uncertainty > NARROW else ((0.0, 0.0),)
-    starts = [prior.means + np.array([-0.005, speed, ramp]) for speed, ramp in shifts]
+    starts = [means + np.array([-0.005, speed, ramp]) for speed, ramp in shifts]
 
     def fit(jumps: bool, slows: bool) -> CurveFit:
         return fit_curve(partial(_shapes, t - touched_s, depth_m, jumps, slows), y, starts, prior, profile.noise_n)
@@ -154,7 +151,7 @@ def _shapes(t: Array, depth_m: float, jumps: bool, slows: bool, parameters: Arra
     )
 
 
-def find_extraction(profile: Profile, insertion: Stroke, pace: Pace, settings: StageSettings) -> tuple[Stroke, float]:
+def find_extraction(profile: Profile, insertion: PlateStroke, pace: Pace, depth_m: float) -> tuple[PlateStroke, float]:
     """Return the way up, and the standard error of the moment at which the plate is out.
 
     Raises StrokeError where the plate was not drawn out.
@@ -170,7 +167,6 @@ def find_extraction(profile: Profile, insertion: Stroke, pace: Pace, settings: S
     last_s = float(times_s[lowest + int(pulled[-1])])
     if times_s[-1] < last_s + 0.1:
         raise StrokeError("the recording ended before the plate was out of the mud")
-    depth_m = settings.depth_m
     unseen_m = depth_m * OUT_MARGIN * threshold_n / -least_n  # below the noise, for a force linear in depth
     period_s = float(np.median(np.diff(times_s)))
     reach_s = (unseen_m / pace.speed_m_s + OUT_MARGIN * period_s) / 2.0
@@ -186,7 +182,7 @@ def find_extraction(profile: Profile, insertion: Stroke, pace: Pace, settings: S
         )
         out_s, reach_s = float(tried_s[best]), 2.0 * reach_s / (OUT_PLACES - 1)
     _, level_n, out_error_s = fits[best]
-    return Stroke(out_s - pace.descent_s(depth_m), out_s, insertion.level_n + level_n), out_error_s
+    return PlateStroke(out_s - pace.descent_s(depth_m), out_s, insertion.level_n + level_n), out_error_s
 
 
 def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> tuple[float, float, float]:
@@ -211,36 +207,35 @@ def _chain(depths_m: Array, depth_m: float) -> Array:
     return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
-def depths_of(trial: AnalysedTrial, settings: StageSettings) -> Array:
+def depths_of(trial: AnalysedTrial) -> Array:
     """Return the depth of each sample of an insertion, measured or found from the force."""
     if trial.positions_m is not None:
         return trial.positions_m
     assert trial.pace is not None
-    times_s, pace = trial.profile.times_s, trial.pace
-    down_m, _ = pace.descend(times_s - trial.strokes["k_p"].begin_s, settings.depth_m)
+    times_s, pace, depth_m = trial.profile.times_s, trial.pace, trial.recorded.settings.depth_m
+    down_m, _ = pace.descend(times_s - trial.strokes["k_p"].begin_s, depth_m)
     if "k_e" not in trial.strokes:
         return down_m
-    return np.minimum(down_m, pace.descend(trial.strokes["k_e"].end_s - times_s, settings.depth_m)[0])
+    return np.minimum(down_m, pace.descend(trial.strokes["k_e"].end_s - times_s, depth_m)[0])
 
 
-def analyse_shear(trial: Recorded, profile: Profile, settings: StageSettings) -> AnalysedTrial:
+def analyse_shear(trial: Recorded, profile: Profile) -> AnalysedTrial:
     """Evaluate the second half of the travel, shorter where the stage stopped early. Raises StrokeError."""
-    forces_n = profile.forces_n - profile.zero_n
-    stroke, speed_m_s = _find_shear(profile, forces_n, settings)
+    forces_n, moment_m3 = profile.forces_n - profile.zero_n, trial.settings.moment_m3
+    stroke, speed_m_s = _find_shear(profile, forces_n, trial.settings)
     steady_n = forces_n[(profile.times_s >= stroke.steady_s) & (profile.times_s <= stroke.end_s)]
     error_n, remark = steadiness(steady_n)
-    k_s = Coefficient(float(np.mean(steady_n)) / settings.moment_m3, error_n / settings.moment_m3)
     return AnalysedTrial(
         recorded=trial,
         profile=profile,
         strokes={"k_s": stroke},
-        coefficients={"k_s": k_s},
+        coefficients={"k_s": Coefficient(float(np.mean(steady_n)) / moment_m3, error_n / moment_m3)},
         remark=remark,
         speed_m_s=speed_m_s,
     )
 
 
-def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> tuple[Stroke, float]:
+def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> tuple[PlateStroke, float]:
     """Return the stroke and its speed, NaN where the force does not show the stop."""
     times_s = profile.times_s
     begin_s = float(times_s[profile.begin])
@@ -266,4 +261,4 @@ def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> t
         raise StrokeError(
             "no steady shear: the force fell before half of the travel. Start the stage after the recording starts"
         )
-    return Stroke(begin_s, to_s, steady_s=from_s), settings.shear_path_m / (stop_s - begin_s)
+    return PlateStroke(begin_s, to_s, steady_s=from_s), settings.shear_path_m / (stop_s - begin_s)

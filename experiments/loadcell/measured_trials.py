@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.loadcell.curve_fit import Array, CurveFit, Prior, cheaper_fit, fit_curve
+from experiments.loadcell.curve_fit import Array, CurveFit, cheaper_fit, fit_curve
 from experiments.loadcell.force_trials import JUMP_PRICE, KNOTS
-from experiments.loadcell.stage_track import RESTING_FRACTION, PositionedProfile, StageTrack, fit_rate
+from experiments.loadcell.stage_track import RESTING_FRACTION, PositionedProfile, fit_rate
 from experiments.loadcell.strokes import (
     LEAST_FORCE_N,
     REVERSAL_FRACTION,
@@ -32,10 +32,10 @@ from experiments.loadcell.strokes import (
     AnalysedTrial,
     Coefficient,
     Mask,
+    PlateStroke,
     Profile,
     Recorded,
     StageSettings,
-    Stroke,
     StrokeError,
     fit_slope,
     is_off_curve,
@@ -63,11 +63,11 @@ WRONG_AXIS = "is the encoder on the axis that moves, and is --position-step its 
 NO_EXTRACTION = "no extraction: the encoder did not see the plate come up. Was it lifted out in time?"
 
 
-def analyse_measured(trial: Recorded, profile: Profile, settings: StageSettings, expected: Alignment) -> AnalysedTrial:
+def analyse_measured(trial: Recorded, profile: Profile, expected: Alignment) -> AnalysedTrial:
     """Raises StrokeError where the positions do not show the stroke."""
     if trial.positions is None or len(trial.positions.times_s) < LEAST_POSITIONS:
         raise StrokeError("the encoder measured hardly any position")
-    stroke = PositionedProfile(profile, StageTrack(trial.positions), settings)
+    stroke = PositionedProfile(profile, trial.positions, trial.settings)
     return (_analyse_shear if trial.kind == SHEAR else _analyse_insertion)(trial, stroke, expected)
 
 
@@ -121,15 +121,15 @@ def _analyse_insertion(trial: Recorded, stroke: PositionedProfile, expected: Ali
     down, up = (way & (depths.depths_m > 0.0) for way in (window.down, window.up))
     speed_m_s = _mean_speed_m_s(stroke.speeds_m_s(lag_s)[down])
     level_n, up_level_n = float(fit.factors[0]), float(fit.factors[-1 if window.has_air else 0])
-    strokes = {"k_p": Stroke(float(times_s[wet[0]]), float(times_s[bottom[0]]), level_n)}
-    depth_error_m = hypot(surface_error_m, stroke.track.interpolation_error_m)
+    strokes = {"k_p": PlateStroke(float(times_s[wet[0]]), float(times_s[bottom[0]]), level_n)}
+    depth_error_m = hypot(surface_error_m, stroke.interpolation_error_m)
     opposing_n = profile.forces_n - level_n
     k_p = _fit_slope(depths, stroke.settings, opposing_n, down, depths.deepest_m, depth_error_m)
     residual_n = sqrt(fit.square / np.count_nonzero(window.down | window.up))
     remark = _remark(stroke, depths.deepest_m, residual_n, float(np.max(np.abs(opposing_n[down]))))
     k_e = Coefficient()
     if np.count_nonzero(up) >= LEAST_SAMPLES:
-        strokes["k_e"] = Stroke(float(times_s[bottom[-1]]), float(times_s[wet[-1]]), up_level_n)
+        strokes["k_e"] = PlateStroke(float(times_s[bottom[-1]]), float(times_s[wet[-1]]), up_level_n)
         depth_error_m = hypot(depth_error_m, speed_m_s * lag_error_s)
         to_m = (1.0 - REVERSAL_FRACTION) * depths.deepest_m
         k_e = _fit_slope(depths, stroke.settings, up_level_n - profile.forces_n, up, to_m, depth_error_m)
@@ -163,7 +163,7 @@ def _fit_stroke(stroke: PositionedProfile, expected: Alignment) -> tuple[_Window
 def _rough_lag_s(stroke: PositionedProfile) -> float:
     """Estimate the lag from the reversal of the force after the stage leaves the bottom; 0 without a reversal."""
     times_s, forces_n = stroke.profile.times_s, stroke.profile.forces_n - stroke.profile.level_n
-    positions_m, lowest = stroke.track.positions_m(times_s), int(np.argmin(forces_n))
+    positions_m, lowest = stroke.positions_m(times_s), int(np.argmin(forces_n))
     at_bottom = np.flatnonzero(positions_m > np.max(positions_m) - BOTTOM_M)
     pushed = np.flatnonzero(forces_n[:lowest] > 0.0)
     if forces_n[lowest] > -LEAST_FORCE_N or not len(pushed):
@@ -176,7 +176,7 @@ def _window(stroke: PositionedProfile, lag_s: float) -> _Window:
     positions_m, speeds_m_s = stroke.mean_positions_m(lag_s), stroke.speeds_m_s(lag_s)
     known, order = np.isfinite(positions_m), np.arange(len(positions_m))
     touched_s = stroke.profile.times_s[stroke.profile.begin]
-    surface_m = float(stroke.track.positions_m(np.array([touched_s - lag_s]))[0])
+    surface_m = float(stroke.positions_m(np.array([touched_s - lag_s]))[0])
     deepest_m = float(np.max(positions_m[known], initial=surface_m))
     path_m = deepest_m - surface_m
     if path_m < LEAST_FRACTION * stroke.settings.depth_m:
@@ -210,10 +210,8 @@ def _best_fit(stroke: PositionedProfile, expected: Alignment, window: _Window, s
     """Include a jump at the surface only where it pays."""
     y = stroke.profile.forces_n[window.down | window.up]
     noise_n = max(stroke.profile.noise_n, LAW_FRACTION * float(np.max(np.abs(y - stroke.profile.level_n))))
-    prior = Prior(
-        np.array([0.0, expected.lag_s, expected.rate_fraction]),
-        np.array([np.inf, expected.lag_uncertainty_s, expected.rate_uncertainty]),
-    )
+    means = np.array([0.0, expected.lag_s, expected.rate_fraction])
+    prior = means, np.array([np.inf, expected.lag_uncertainty_s, expected.rate_uncertainty])
     kink, jump = (
         fit_curve(partial(_shapes, stroke, window, jumps), y, starts, prior, noise_n) for jumps in (False, True)
     )
@@ -231,7 +229,7 @@ def _shapes(stroke: PositionedProfile, window: _Window, jumps: bool, parameters:
     until_s, part_s = stroke.profile.times_s[chosen] - lag_s, stroke.period_s / PARTS
     columns = np.zeros((len(until_s), 2 + len(KNOTS)))
     for part in range(PARTS):
-        wet_m = np.clip(stroke.track.positions_m(until_s - (part + 0.5) * part_s) - surface_m, 0.0, None)
+        wet_m = np.clip(stroke.positions_m(until_s - (part + 0.5) * part_s) - surface_m, 0.0, None)
         columns[:, 0] += wet_m / stroke.settings.depth_m
         columns[:, 1] += jumps * np.clip(wet_m / YIELD_M, 0.0, 1.0)
         for knot, unit in enumerate(np.eye(len(KNOTS))[1:]):
@@ -306,12 +304,12 @@ def _analyse_shear(trial: Recorded, stroke: PositionedProfile, expected: Alignme
         remark=remark,
         shared_uncertainty=abs(rate_n) / mean_n,
         positions_m=travels_m,
-        position_error_m=stroke.track.interpolation_error_m,
+        position_error_m=stroke.interpolation_error_m,
         alignment=fit_rate(felt_n, speed_terms),
     )
 
 
-def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) -> tuple[Stroke, Mask]:
+def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) -> tuple[PlateStroke, Mask]:
     """Return the motion, and the samples of its second half that count. Raises StrokeError."""
     times_s, set_m = stroke.profile.times_s, stroke.settings.shear_path_m
     known = np.isfinite(travels_m)
@@ -327,4 +325,4 @@ def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) 
     if np.count_nonzero(steady) < 8:
         raise StrokeError("fewer than 8 samples with force and position in the second half of the travel")
     from_s, to_s = float(times_s[steady][0]), float(times_s[steady][-1])
-    return Stroke(float(times_s[begin]), to_s, steady_s=from_s), steady
+    return PlateStroke(float(times_s[begin]), to_s, steady_s=from_s), steady

@@ -29,7 +29,7 @@ def draw_mud(
     strokes = [trial for trial in trials if "k_p" in trial.strokes]
     for i, trial in enumerate(strokes):
         look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
-        _plot_insertion((vertical, depth, curve), trial, settings, look, f"trial {i + 1}")
+        _plot_insertion((vertical, depth, curve), trial, look, f"trial {i + 1}")
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
     drags = [(trial, trial.strokes["k_s"]) for trial in trials if "k_s" in trial.strokes]
@@ -46,11 +46,9 @@ def draw_mud(
     return figure
 
 
-def _plot_insertion(
-    panels: tuple[Axes, Axes, Axes], trial: AnalysedTrial, settings: StageSettings, look: dict[str, Any], label: str
-) -> None:
+def _plot_insertion(panels: tuple[Axes, Axes, Axes], trial: AnalysedTrial, look: dict[str, Any], label: str) -> None:
     """Plot force and depth against time, and force against depth."""
-    profile, depths_m, down = trial.profile, depths_of(trial, settings), trial.strokes["k_p"]
+    profile, depths_m, down = trial.profile, depths_of(trial), trial.strokes["k_p"]
     end_s = trial.strokes["k_e"].end_s if "k_e" in trial.strokes else profile.times_s[-1]
     shown = (profile.times_s > down.begin_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
     since_s, forces_n = profile.times_s[shown] - down.begin_s, profile.forces_n[shown] - down.level_n
@@ -70,7 +68,7 @@ def _plot_vertical_model(
     settings: StageSettings,
 ) -> None:
     """Plot the model against time, along the depths of the trial."""
-    profile, trial_m = trial.profile, depths_of(trial, settings)
+    profile, trial_m = trial.profile, depths_of(trial)
     times_s, even_m = profile.times_s, np.linspace(0.0, settings.depth_m, 40)
     for name, stroke in trial.strokes.items():
         sign, fraction = (1.0, 1.0) if name == "k_p" else (-1.0, 1.0 - REVERSAL_FRACTION)

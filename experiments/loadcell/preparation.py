@@ -18,9 +18,7 @@ from drivers.load_cell.calibration import (
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
 from drivers.load_cell.stage_encoder import StageEncoderSettings
 from drivers.serial.serial_line import SerialLine, text_fraction
-from experiments.loadcell.recording import CellRecorder
-from experiments.loadcell.strokes import StageSettings
-from experiments.loadcell.trials import TrialBench
+from experiments.loadcell.recording import CellBench
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON
 
@@ -50,27 +48,28 @@ class CellSettings:
     calibration: Path | None = None
     encoder: StageEncoderSettings | None = None
     seed: int = 1  # of the emulated devices
+    practises: bool = False  # a person answers the prompts, which the emulated stage obeys
 
 
-def prepare_cell(bench: TrialBench, cell: CellSettings) -> None:
+def prepare_cell(bench: CellBench, cell: CellSettings) -> None:
     """Find the format of the lines, check the encoder, calibrate, check the rate. Raises BenchError."""
-    recorder, port = bench.recorder, bench.recorder.port
-    recorder.report(f"listening to {port.line.path} at {port.line.baud} baud")
-    port.line_format = LineFormat(examine_lines(recorder, cell.format_name))
-    examine_encoder(recorder, bench.plan.settings)
+    port = bench.port
+    bench.report(f"listening to {port.line.path} at {port.line.baud} baud")
+    port.line_format = LineFormat(examine_lines(bench, cell.format_name))
+    examine_encoder(bench)
     port.calibration = _find_calibration(bench, cell)
-    _check_rate(recorder, bench.plan.settings)
+    _check_rate(bench)
 
 
 # lines
 
 
-def examine_lines(recorder: CellRecorder, name: str) -> str:
+def examine_lines(bench: CellBench, name: str) -> str:
     """Return the name of the format that reads the lines; `name` is the wanted one or "auto". Raises BenchError."""
-    port = recorder.port
-    recorder.listen(LISTENING_S)
-    _require_text(recorder, port.line, "amplifier", "--baud")
-    lines, readable = list(port.line.recent), port.arrivals.readable
+    port = bench.port
+    bench.listen(LISTENING_S)
+    _require_text(bench, port.line, "amplifier", "--baud")
+    lines, readable = list(port.line.recent), port.readable_fraction
     found = find_format(lines)
     if name != AUTO and readable >= READABLE_FRACTION:
         return name
@@ -80,13 +79,13 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     raise BenchError(f"{read} such as {_quote(lines)}. {f'--format {found.name} does' if found else CHOOSE}")
 
 
-def examine_encoder(recorder: CellRecorder, settings: StageSettings) -> None:
+def examine_encoder(bench: CellBench) -> None:
     """Check that counts arrive, and often enough for the stroke. Raises BenchError."""
-    encoder = recorder.encoder
+    encoder, settings = bench.encoder, bench.plan.settings
     if encoder is None:
         return
-    _require_text(recorder, encoder.line, "encoder", "--position-baud", f"; {OR_WITHOUT}")
-    if encoder.arrivals.readable < READABLE_FRACTION:
+    _require_text(bench, encoder.line, "encoder", "--position-baud", f"; {OR_WITHOUT}")
+    if encoder.readable_fraction < READABLE_FRACTION:
         label = encoder.settings.label
         expected = f"a label {label!r} and a whole number" if label else "a whole number"
         raise BenchError(
@@ -96,7 +95,7 @@ def examine_encoder(recorder: CellRecorder, settings: StageSettings) -> None:
     rate_hz = encoder.line.clock.rate_hz or 0.0
     between_m = settings.speed_m_s / (rate_hz or 1.0)
     if LEAST_POSITIONS * between_m > settings.depth_m:
-        recorder.report(
+        bench.report(
             f"the encoder sends {rate_hz:.0f} lines/s, one per {1000.0 * between_m:.1f} mm of travel: "
             f"make it send faster, for at least {LEAST_POSITIONS} lines in an insertion"
         )
@@ -106,10 +105,10 @@ def _quote(lines: Iterable[bytes]) -> str:
     return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in [*lines][-2:])
 
 
-def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option: str, otherwise: str = "") -> None:
+def _require_text(bench: CellBench, line: SerialLine, device: str, option: str, otherwise: str = "") -> None:
     """Raises BenchError where nothing arrives, or bytes of another baud rate."""
     if not line.recent:
-        recorder.listen(STARTING_S)
+        bench.listen(STARTING_S)
     if not line.recent:
         raise BenchError(
             f"nothing arrives on {line.path} at {line.baud} baud: check the {device}'s power and cable, that it sends "
@@ -125,13 +124,13 @@ def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option:
 # calibration
 
 
-def _find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
+def _find_calibration(bench: CellBench, cell: CellSettings) -> LoadCellCalibration:
     """Take the given file, the unit's own scale or the folder's file, or calibrate now. Raises BenchError."""
-    port = bench.recorder.port
+    port = bench.port
     readings = filter(None, (port.line_format.decode(line) for line in port.line.recent))
     units = Counter(reading.unit for reading in readings if reading.unit)
     unit = cell.unit or max(units, key=units.__getitem__, default=COUNTS)  # that of most lines
-    file = bench.folder / CALIBRATION
+    file = bench.session.folder / CALIBRATION
     try:
         if cell.calibration is not None:
             return read_calibration(cell.calibration)
@@ -139,58 +138,57 @@ def _find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibrat
         if known is not None:
             return known
         if file.exists():
-            bench.recorder.report(f"calibration from {file}; remove it to calibrate again")
+            bench.report(f"calibration from {file}; remove it to calibrate again")
             return read_calibration(file)
     except CalibrationError as problem:
         raise BenchError(str(problem)) from problem
     return _calibrate_now(bench, unit, file)
 
 
-def _calibrate_now(bench: TrialBench, unit: str, file: Path) -> LoadCellCalibration:
+def _calibrate_now(bench: CellBench, unit: str, file: Path) -> LoadCellCalibration:
     """Weigh two known weights, again until they give a span or the operator stops."""
-    recorder = bench.recorder
-    recorder.port.calibration = LoadCellCalibration(unit, 1.0)
+    bench.port.calibration = LoadCellCalibration(unit, 1.0)
     while True:
         try:
-            weighings = [weigh(bench.stage.weigh(which), _read_weight(recorder)) for which in (0, 1)]
+            weighings = [weigh(bench.stage.weigh(which), _read_weight(bench)) for which in (0, 1)]
             calibration = calibrate(unit, *weighings)
         except CalibrationError as problem:
-            bench.recorder.report(str(problem))
-            if recorder.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}) == STOP:
+            bench.report(str(problem))
+            if bench.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}) == STOP:
                 raise BenchError("the load cell is not calibrated") from problem
             continue
         for remark in remarks_about(calibration, *weighings):
-            bench.recorder.report(remark)
+            bench.report(remark)
         write_calibration(file, calibration)
-        bench.recorder.report(
+        bench.report(
             f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
             f"saved in {file}"
         )
         return calibration
 
 
-def _read_weight(recorder: CellRecorder) -> list[float]:
+def _read_weight(bench: CellBench) -> list[float]:
     """Raises CalibrationError where the weight overloads the cell."""
-    recorder.drain()
-    samples = recorder.listen(WEIGHING_S)
+    bench.drain()
+    samples = bench.listen(WEIGHING_S)
     readings = [sample.force_n for sample in samples if not sample.overloaded]
     if len(readings) < len(samples) / 2.0:
         raise CalibrationError("the load cell is overloaded by this weight: take a lighter one, or check its wires")
     return readings
 
 
-def _check_rate(recorder: CellRecorder, settings: StageSettings) -> None:
+def _check_rate(bench: CellBench) -> None:
     """Warn of an amplifier that is too slow for the stroke. Raises BenchError where the operator stops."""
-    rate_hz = recorder.port.line.clock.rate_hz
+    rate_hz, settings = bench.port.line.clock.rate_hz, bench.plan.settings
     if rate_hz is None:
         raise BenchError("too few lines arrive to measure their rate: check the amplifier")
     duration_s = settings.depth_m / settings.speed_m_s
     samples = rate_hz * duration_s
     if samples < LEAST_SAMPLES:
         slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
-        recorder.report(
+        bench.report(
             f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has {samples:.0f} samples "
             f"and needs {LEAST_SAMPLES}. Choose a faster rate (an HX711's RATE pin high), or --speed {slower_m_s:.2g}"
         )
-        if recorder.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}) == STOP:
+        if bench.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}) == STOP:
             raise BenchError("stopped: the amplifier is too slow for the stroke")

@@ -6,19 +6,30 @@ own bytes, only faster than real ones. The notebook's entry of a trial names its
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from pandas import read_csv
+from scipy.signal import detrend
 
-from drivers.load_cell.load_cell_port import LoadCellPort, Sample
+from drivers.load_cell.load_cell_port import ForceSample, LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.strokes import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, Recorded, StagePositions, noise_of
+from experiments.loadcell.stage import Stage, TrialPlan
+from experiments.loadcell.strokes import (
+    CONTACT_NOISES,
+    LEAST_FORCE_N,
+    QUIET_S,
+    Recorded,
+    StagePositions,
+    StageSettings,
+    noise_of,
+)
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Entry, Notebook
-from experiments.study.prompt import Operator
+from experiments.study.session import Session
 from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005
@@ -58,48 +69,50 @@ Counts = dict[str, int]  # of the problems of a serial line, by their keys in th
 class StrokeRecording(NamedTuple):
     """The lines of a stroke, and what went wrong on the lines of both devices."""
 
-    samples: list[Sample]
+    samples: list[ForceSample]
     problems: Counts
     positions: list[StagePosition]
     position_problems: Counts  # empty where the stage has no encoder
 
 
-class CellRecorder:
-    """Reads the ports, also while the operator is asked. An `encoder` belongs to the stage."""
+@dataclass
+class CellBench:
+    """The devices, which are read while the operator is asked too, and the plan and the notebook of the trials."""
 
-    def __init__(
-        self,
-        port: LoadCellPort,
-        clock: WallClock | EmulatedBench,
-        operator: Operator,
-        encoder: StageEncoder | None = None,
-    ) -> None:
-        self.port, self.clock, self.operator, self.encoder = port, clock, operator, encoder
-        self.report = operator.report
-        self._positions: list[StagePosition] = []
+    session: Session
+    plan: TrialPlan
+    notebook: Notebook
+    port: LoadCellPort
+    clock: WallClock | EmulatedBench
+    encoder: StageEncoder | None  # of the stage
+    stage: Stage = field(init=False)
+    _positions: list[StagePosition] = field(default_factory=list)
+
+    def report(self, message: str) -> None:
+        self.session.operator.report(message)
 
     def ask(self, question: str, answers: Mapping[str, str]) -> str:
-        return self.operator.ask(question, answers, self.drain)
+        return self.session.operator.ask(question, answers, self.drain)
 
     def drain(self) -> None:
         """Discard everything that has arrived."""
         self._read()
         self._positions = []
 
-    def _read(self) -> list[Sample]:
+    def _read(self) -> list[ForceSample]:
         now_s = self.clock.now_s()
         if self.encoder is not None:
             self._positions += self.encoder.read(now_s)
         return self.port.read(now_s)
 
-    def listen(self, duration_s: float) -> list[Sample]:
+    def listen(self, duration_s: float) -> list[ForceSample]:
         self._await_port()
-        samples, end_s = list[Sample](), self.clock.now_s() + duration_s
+        samples, end_s = list[ForceSample](), self.clock.now_s() + duration_s
         while self.clock.now_s() < end_s:
             samples += self._poll()
         return samples
 
-    def _poll(self) -> list[Sample]:
+    def _poll(self) -> list[ForceSample]:
         self.clock.pass_time(POLL_S)
         return self._read()
 
@@ -120,7 +133,7 @@ class CellRecorder:
         forces_n = self._steady_forces_n()
         if len(forces_n) < 4 and not self.port.line.is_there:
             forces_n = self._steady_forces_n()
-        if len(forces_n) < 4 and self.port.overloads and self.port.arrivals.readable > 0.5:
+        if len(forces_n) < 4 and self.port.overloads and self.port.readable_fraction > 0.5:
             raise BenchError("the load cell reports an overload with nothing on it: check its mounting and its wires")
         if len(forces_n) < 4:
             raise BenchError(f"no samples arrive from {self.port.line.path}: check the amplifier's power and cable")
@@ -136,7 +149,7 @@ class CellRecorder:
         self._await_port()
         self.drain()
         before, contact, has_touched = self._counts(), _Contact(noise_n), False
-        samples, end_s = list[Sample](), self.clock.now_s() + patience_s
+        samples, end_s = list[ForceSample](), self.clock.now_s() + patience_s
         while self.clock.now_s() < end_s and self.port.line.is_there:
             fresh = self._poll()
             samples += fresh
@@ -172,8 +185,7 @@ def correlation(forces_n: Array) -> float:
     """Return the correlation of successive samples, without their drift; 0 where the resolution is too coarse."""
     if len(np.unique(forces_n)) < LEAST_VALUES:
         return 0.0
-    order = np.arange(len(forces_n))
-    apart_n = forces_n - np.polyval(np.polyfit(order, forces_n, 1), order)
+    apart_n = detrend(forces_n)
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
 
 
@@ -182,11 +194,11 @@ class _Contact:
 
     def __init__(self, noise_n: float) -> None:
         self._bound_n = max(2.0 * CONTACT_NOISES * noise_n, LEAST_FORCE_N)
-        self._quiet: list[Sample] = []
+        self._quiet: list[ForceSample] = []
         self._level_n: float | None = None
         self._away = 0
 
-    def is_reached_by(self, sample: Sample) -> bool:
+    def is_reached_by(self, sample: ForceSample) -> bool:
         if self._level_n is None:
             self._quiet.append(sample)
             quiet_n = [each.force_n for each in self._quiet if not each.overloaded]
@@ -213,7 +225,7 @@ def _read_columns(path: Path) -> Array:
     return np.asarray(read_csv(path), dtype=np.float64).T
 
 
-def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:
+def load_recorded(folder: Path, key: str, entry: Entry, settings: StageSettings) -> Recorded:
     """Read one trial. Raises OSError, ValueError for a file of another kind."""
     times_s, forces_n, overloaded = _read_columns(folder / entry["file"])
     valid, position, positions = overloaded == 0.0, entry.get("position"), None
@@ -223,6 +235,7 @@ def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:
         key=key,
         mud=entry["mud"],
         kind=entry["kind"],
+        settings=settings,
         times_s=times_s[valid],
         forces_n=forces_n[valid],
         zero_n=(entry["zero_before_n"] + entry["zero_after_n"]) / 2.0,
@@ -230,10 +243,10 @@ def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:
     )
 
 
-def load_counted(folder: Path, notebook: Notebook) -> list[Recorded]:
+def load_counted(folder: Path, notebook: Notebook, settings: StageSettings) -> list[Recorded]:
     """Read all trials that count."""
     return [
-        load_recorded(folder, key, entry)
+        load_recorded(folder, key, entry, settings)
         for key, entry in notebook.entries.items()
         if "file" in entry and not entry.get("skipped")
     ]

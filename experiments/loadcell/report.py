@@ -1,9 +1,10 @@
 """Evaluates the recorded trials of a load cell: coefficients of each mud with their errors, tables and figures."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -21,15 +22,15 @@ from experiments.loadcell.analysis import (
     gather_trials,
     speed_remark,
 )
-from experiments.loadcell.comparison import compare_muds
 from experiments.loadcell.plots import draw_coefficients, draw_mud
 from experiments.loadcell.recording import load_counted
+from experiments.loadcell.stage import TrialPlan
 from experiments.loadcell.stage_track import common_alignment
 from experiments.loadcell.strokes import INSERTION, RATE_EXPONENT, AnalysedTrial, StageSettings
-from experiments.loadcell.trials import TrialPlan
-from experiments.reports.mud_names import mud_text
+from experiments.reports.mud_names import mud_key, mud_text
 from experiments.reports.value_text import N_CM3, miss_text, repeatability_text, value_text
 from experiments.study.notebook import Notebook
+from experiments.study.option import OptionError
 from experiments.study.result import Figure, Result, Table, to_json
 from experiments.study.session import Show
 from experiments.trials.load_cell_truth import OTHER_PLATE, Truth
@@ -63,7 +64,7 @@ class Results(NamedTuple):
 
 def evaluate_muds(folder: Path, notebook: Notebook, plan: TrialPlan, show: Show) -> Results:
     """Evaluate the recorded trials of a folder."""
-    trials = analyse(load_counted(folder, notebook), plan.settings, show)
+    trials = analyse(load_counted(folder, notebook, plan.settings), show)
     muds: dict[str, dict[str, MudCoefficient]] = {}
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
         own, muds[mud] = [trial for trial in trials if trial.recorded.mud == mud], {}
@@ -74,13 +75,12 @@ def evaluate_muds(folder: Path, notebook: Notebook, plan: TrialPlan, show: Show)
             depth_error_m = 0.0 if is_measured and name != "k_s" else plan.depth_error_m
             bench = bench_uncertainty(name, plan.settings, depth_error_m, calibration_error)
             muds[mud][name] = gather_trials(own, name, bench)
-    return Results(trials, muds, list_remarks(trials, plan.settings))
+    return Results(trials, muds, list_remarks(trials))
 
 
-def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> list[str]:
+def list_remarks(trials: Sequence[AnalysedTrial]) -> list[str]:
     remarks = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
-    paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
-    by_trial = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
+    by_trial = {trial.recorded.key: remark for trial in trials if (remark := speed_remark(trial))}
     if len(by_trial) > 3:
         remarks.append(f"in {len(by_trial)} trials {next(iter(by_trial.values()))}")
     else:
@@ -195,6 +195,43 @@ def _trial_row(trial: AnalysedTrial) -> dict[str, Any]:
         farthest_m = float(np.nanmax(trial.positions_m))
         row["measured (cm)"] = value_text(100.0 * farthest_m, 100.0 * trial.position_error_m)
     return row | {"remark": trial.problem or trial.remark}
+
+
+def load_flipper(path: Path) -> dict[str, Any]:
+    """Read the summary of a flipper experiment, or the one in a folder. Raises OptionError, OSError."""
+    path = path / "summary.json" if path.is_dir() else path
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as problem:
+        raise OptionError(f"{path} is no summary of an experiment: {problem}") from problem
+    if not isinstance(summary, dict) or not isinstance(summary.get("muds"), list):
+        raise OptionError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
+    return summary
+
+
+def compare_muds(flipper: Mapping[str, Any], muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[dict[str, Any]]:
+    """Return a row for each coefficient that both measured, in N/m³. `flipper` is a summary, or empty."""
+    sensed = {mud_key(str(row.get("mud"))): row for row in flipper.get("muds", ()) if isinstance(row, dict)}
+    rows = []
+    for mud, name, truth in ((mud, name, each) for mud, of_mud in muds.items() for name, each in of_mud.items()):
+        estimate: Any = sensed.get(mud_key(mud), {}).get(name)
+        value = estimate.get("value") if isinstance(estimate, dict) else None
+        if isinstance(value, int | float) and value > 0.0 and isfinite(truth.value):
+            error, ratio = estimate.get("std_error") or 0.0, value / truth.value
+            rows.append(
+                {
+                    "mud": mud,
+                    "coefficient": name,
+                    "sensed": value,
+                    "sensed_std_error": error,
+                    "truth": truth.value,
+                    "truth_std_error": truth.std_error,
+                    "at_least": bool(estimate.get("at_least")),  # the flipper's value is a lower bound
+                    "ratio": ratio,
+                    "ratio_std_error": ratio * hypot(error / value, truth.std_error / truth.value),
+                }
+            )
+    return rows
 
 
 # texts

@@ -31,10 +31,12 @@ CORRELATION = 2.0  # standard error of correlated samples over that of independe
 WIDE = Alignment(0.0, 0.08, 0.03, 0.08)  # adapters and filters; 5 to 20 % a decade, as clay practice has it
 
 
-class StageTrack:
-    """Position against time, relative to the first position, and positive in the direction of the stroke."""
+class PositionedProfile:
+    """Forces with their positions, which are relative to the first one and positive in the direction of the stroke."""
 
-    def __init__(self, lines: StagePositions) -> None:
+    def __init__(self, profile: Profile, lines: StagePositions, settings: StageSettings) -> None:
+        self.profile, self.settings = profile, settings
+        self.period_s = float(np.median(np.diff(profile.times_s)))
         positions_m = without_leaps(lines.positions_m - lines.positions_m[0])
         farthest_m = positions_m[int(np.argmax(np.abs(positions_m)))]
         self._times_s, self._positions_m = lines.times_s, positions_m if farthest_m > 0.0 else -positions_m
@@ -53,8 +55,9 @@ class StageTrack:
     def positions_m(self, times_s: Array) -> Array:
         return np.interp(times_s, self._times_s, self._positions_m)
 
-    def mean_positions_m(self, until_s: Array, over_s: float) -> Array:
-        """Return the mean over `over_s` before each time; NaN where the position is unknown."""
+    def mean_positions_m(self, lag_s: float) -> Array:
+        """Return the position of each force, the mean over the period before it; NaN where it is unknown."""
+        until_s, over_s = self.profile.times_s - lag_s, self.period_s
         mean_m = (self._integral(until_s) - self._integral(until_s - over_s)) / over_s
         gaps_s = np.interp(until_s, self._times_s, self._unknown_s)
         gaps_s -= np.interp(until_s - over_s, self._times_s, self._unknown_s)
@@ -65,6 +68,19 @@ class StageTrack:
         line = np.clip(np.searchsorted(self._times_s, times_s) - 1, 0, len(self._times_s) - 2)
         since_s = times_s - self._times_s[line]
         return self._sums[line] + since_s * (self._positions_m[line] + self.positions_m(times_s)) / 2.0
+
+    def speeds_m_s(self, lag_s: float) -> Array:
+        until_s = self.profile.times_s - lag_s
+        return (self.positions_m(until_s) - self.positions_m(until_s - self.period_s)) / self.period_s
+
+    def speed_terms(self, lag_s: float) -> Array:
+        """Return (v/v_0)^0.4 - 1 of each force."""
+        fractions = np.maximum(np.abs(self.speeds_m_s(lag_s)) / self.settings.speed_m_s, RESTING_FRACTION)
+        return np.asarray(fractions**RATE_EXPONENT - 1.0, dtype=np.float64)
+
+    def speed_factors(self, lag_s: float, rate_fraction: float) -> Array:
+        """Return g of each force."""
+        return 1.0 + rate_fraction * self.speed_terms(lag_s)
 
 
 def without_leaps(positions_m: Array) -> Array:
@@ -77,31 +93,6 @@ def without_leaps(positions_m: Array) -> Array:
     fixed = positions_m.copy()
     fixed[2:-2][leaps] = near_m[leaps]
     return fixed
-
-
-class PositionedProfile:
-    """Forces with their positions."""
-
-    def __init__(self, profile: Profile, track: StageTrack, settings: StageSettings) -> None:
-        self.profile, self.track, self.settings = profile, track, settings
-        self.period_s = float(np.median(np.diff(profile.times_s)))
-
-    def mean_positions_m(self, lag_s: float) -> Array:
-        """Return the position of each force; NaN where it is unknown."""
-        return self.track.mean_positions_m(self.profile.times_s - lag_s, self.period_s)
-
-    def speeds_m_s(self, lag_s: float) -> Array:
-        until_s = self.profile.times_s - lag_s
-        return (self.track.positions_m(until_s) - self.track.positions_m(until_s - self.period_s)) / self.period_s
-
-    def speed_terms(self, lag_s: float) -> Array:
-        """Return (v/v_0)^0.4 - 1 of each force."""
-        fractions = np.maximum(np.abs(self.speeds_m_s(lag_s)) / self.settings.speed_m_s, RESTING_FRACTION)
-        return np.asarray(fractions**RATE_EXPONENT - 1.0, dtype=np.float64)
-
-    def speed_factors(self, lag_s: float, rate_fraction: float) -> Array:
-        """Return g of each force."""
-        return 1.0 + rate_fraction * self.speed_terms(lag_s)
 
 
 def fit_rate(forces_n: Array, speed_terms: Array) -> Alignment:

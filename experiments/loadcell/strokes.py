@@ -16,12 +16,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import hypot, nan, sqrt
 from statistics import fmean, stdev
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
 from estimation.strokes.origin_fit import MIN_BATCHES, NORMAL_MAD, student_factor
@@ -54,13 +53,13 @@ class StrokeError(Exception):
 class StageSettings:
     """The motion that the operator set, and the plate."""
 
-    depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.03
-    speed_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
-    hold_s: Annotated[float, Bounds(0.5, 60.0)] = 3.0
-    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = 0.2
-    plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.03
-    plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.035
-    plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
+    depth_m: float = 0.03
+    speed_m_s: float = 0.1
+    hold_s: float = 3.0
+    shear_path_m: float = 0.2
+    plate_width_m: float = 0.03
+    plate_height_m: float = 0.035
+    plate_thickness_m: float = 0.004
 
     @property
     def plate(self) -> FlipperGeometry:
@@ -90,11 +89,12 @@ class StagePositions(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """The valid samples of one trial, and the zero with the plate clear of the mud."""
+    """The valid samples of one trial, the zero with the plate clear of the mud, and how the stage was set."""
 
     key: str
     mud: str
     kind: str
+    settings: StageSettings
     times_s: Array
     forces_n: Array
     zero_n: float
@@ -141,7 +141,7 @@ class Pace(NamedTuple):
         )
 
 
-class Stroke(NamedTuple):
+class PlateStroke(NamedTuple):
     """One motion of the plate in the mud."""
 
     begin_s: float
@@ -172,7 +172,7 @@ class AnalysedTrial:
 
     recorded: Recorded
     profile: Profile = NO_PROFILE  # where there is no contact
-    strokes: Mapping[str, Stroke] = field(default_factory=dict)  # by the coefficient that they show
+    strokes: Mapping[str, PlateStroke] = field(default_factory=dict)  # by the coefficient that they show
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
     remark: str = ""
@@ -195,7 +195,7 @@ def noise_of(forces_n: Array) -> float:
 
 def find_contact(trial: Recorded) -> Profile:
     """Find the first sample in contact. Raises StrokeError where there is none, or the stroke had begun before."""
-    times_s, forces_n = trial.times_s, _without_spikes(trial.forces_n)
+    times_s, forces_n = trial.times_s, without_spikes(trial.forces_n)
     if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
         raise StrokeError("hardly any sample was recorded")
     quiet_n = forces_n[times_s < times_s[0] + QUIET_S]
@@ -237,7 +237,7 @@ def _leaves_zero(times_s: Array, forces_n: Array, bound_n: float) -> tuple[int, 
     raise StrokeError("the stage was moving already when the recording began, or only single samples left the zero")
 
 
-def _without_spikes(forces_n: Array) -> Array:
+def without_spikes(forces_n: Array) -> Array:
     """Replace single samples far from two neighbours that agree, such as a garbled digit or a knock."""
     if len(forces_n) < 5:
         return forces_n

@@ -6,32 +6,28 @@ file that counts. The same command continues an interrupted experiment.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 
 from experiments.loadcell.analysis import analyse_trial, speed_remark
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.force_trials import wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
     FORCES,
     POSITIONS,
     RAW,
-    CellRecorder,
+    CellBench,
     StrokeRecording,
     load_recorded,
     write_rows,
 )
-from experiments.loadcell.stage import Stage, Trial
-from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Mask, StageSettings
+from experiments.loadcell.stage import CellTrial
+from experiments.loadcell.strokes import INSERTION, AnalysedTrial, Mask
 from experiments.robot.steps import OperatorStep, conduct_steps
-from experiments.study.notebook import Entry, Notebook
+from experiments.study.notebook import Entry
 from experiments.study.prompt import GO_ON, REDO, SKIP
-from experiments.study.session import Show
 
 KEEP, WITHOUT = "k", "w"
 OFFERED = {GO_ON: "measure it again", KEEP: "keep it as it is", SKIP: "leave it out"}
@@ -49,49 +45,25 @@ MISSING_FRACTION = 0.15  # of the samples of a stroke
 FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates without a message
 
 
-@dataclass(frozen=True)
-class TrialPlan:
-    muds: tuple[str, ...]
-    trials: int
-    settings: StageSettings
-    depth_error_m: float = 0.5e-3  # of a ruler, and of mud that is levelled by hand
-
-    def list_trials(self) -> list[Trial]:
-        numbers = range(1, self.trials + 1)
-        return [Trial(mud, kind, number) for mud in self.muds for kind in KINDS for number in numbers]
-
-
-@dataclass(frozen=True)
-class TrialBench:
-    """The devices, the plan and the files of the trials."""
-
-    recorder: CellRecorder
-    stage: Stage
-    plan: TrialPlan
-    notebook: Notebook
-    folder: Path
-    show: Show
-
-
-def measure_all(bench: TrialBench) -> None:
+def measure_all(bench: CellBench) -> None:
     """Measure every trial that is not in the notebook."""
     steps = [
         OperatorStep(trial.key, partial(bench.stage.prepare, trial, bench.plan.trials), partial(measure, bench, trial))
         for trial in bench.plan.list_trials()
     ]
-    conduct_steps(steps, bench.notebook, bench.recorder.operator, bench.show, {"skipped": True})
+    conduct_steps(steps, bench.notebook, bench.session.operator, bench.session.show, {"skipped": True})
 
 
-def measure(bench: TrialBench, trial: Trial) -> Entry:
+def measure(bench: CellBench, trial: CellTrial) -> Entry:
     """Measure a prepared trial, again where the operator wants it so. Return its entry for the notebook."""
     for attempt in count(1):
         entry, problems = record(bench, trial, attempt)
         if not problems:
             return entry
         for problem in problems:
-            bench.recorder.report(f"{trial.key}: {problem}")
+            bench.report(f"{trial.key}: {problem}")
         offered = OFFERED_OFTEN if attempt >= MOST_ATTEMPTS else OFFERED
-        answer = bench.recorder.ask(f"{trial.key} may be invalid. What now?", offered)
+        answer = bench.ask(f"{trial.key} may be invalid. What now?", offered)
         if answer == KEEP:
             return entry | {"kept_in_spite_of": problems}
         given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
@@ -100,70 +72,69 @@ def measure(bench: TrialBench, trial: Trial) -> Entry:
     return entry | {"skipped": True, "why": problems}
 
 
-def record(bench: TrialBench, trial: Trial, attempt: int) -> tuple[Entry, list[str]]:
+def record(bench: CellBench, trial: CellTrial, attempt: int) -> tuple[Entry, list[str]]:
     """Record one stroke; return its entry for the notebook, and its problems."""
-    recorder, stage, settings = bench.recorder, bench.stage, bench.plan.settings
-    _await_encoder(recorder)
-    before = recorder.tare()
+    stage, settings, folder = bench.stage, bench.plan.settings, bench.session.folder
+    _await_encoder(bench)
+    before = bench.tare()
     if before.is_averaged and trial.number == attempt == 1:
-        recorder.report(f"{trial.key}: {AVERAGED}")
-    slow = SLOW_BY_HAND if recorder.encoder else SLOW
+        bench.report(f"{trial.key}: {AVERAGED}")
+    slow = SLOW_BY_HAND if bench.encoder else SLOW
     longest_s = slow * settings.shear_path_m / settings.speed_m_s
     if trial.kind == INSERTION:
         longest_s = 2.0 * slow * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
     else:
         stage.lower()
     stage.start(trial)
-    stroke = recorder.record(before.noise_n, stage.patience_s, longest_s)
+    stroke = bench.record(before.noise_n, stage.patience_s, longest_s)
     plain_key = re.sub(r"[^\w.]+", "_", trial.key)
     name = f"{RAW}/{plain_key}_{attempt}"
-    write_rows(bench.folder / f"{name}.csv", FORCES, stroke.samples)
+    write_rows(folder / f"{name}.csv", FORCES, stroke.samples)
     stage.lift()
-    after = recorder.tare()
+    after = bench.tare()
     entry: Entry = trial._asdict() | {
         "file": f"{name}.csv",
         "zero_before_n": before.force_n,
         "zero_after_n": after.force_n,
         "noise_n": before.noise_n,
-        "rate_hz": recorder.port.line.clock.rate_hz,
+        "rate_hz": bench.port.line.clock.rate_hz,
         "samples": len(stroke.samples),
         **stroke.problems,
-        "calibration": recorder.port.calibration._asdict(),
+        "calibration": bench.port.calibration._asdict(),
     }
-    if recorder.encoder is not None:
-        rate_hz = recorder.encoder.line.clock.rate_hz
+    if bench.encoder is not None:
+        rate_hz = bench.encoder.line.clock.rate_hz
         counts = {"places": len(stroke.positions), "rate_hz": rate_hz, **stroke.position_problems}
         entry["position"] = {"file": f"{name}_position.csv", **counts}
-        write_rows(bench.folder / f"{name}_position.csv", POSITIONS, stroke.positions)
-    recorded = load_recorded(bench.folder, trial.key, entry)
-    analysed = analyse_trial(recorded, settings, wide_pace(settings))
-    if analysed.pace and (remark := speed_remark(analysed.pace, settings, SINGLE_SPEED_BOUND)):
-        recorder.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
+        write_rows(folder / f"{name}_position.csv", POSITIONS, stroke.positions)
+    analysed = analyse_trial(load_recorded(folder, trial.key, entry, settings))
+    if remark := speed_remark(analysed, SINGLE_SPEED_BOUND):
+        bench.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
     return entry, list_problems(analysed, stroke, abs(after.force_n - before.force_n))
 
 
-def _await_encoder(recorder: CellRecorder) -> None:
+def _await_encoder(bench: CellBench) -> None:
     """Wait for an encoder that is unplugged or silent, or go on without it."""
     for attempt in count(1):
-        encoder = recorder.encoder
+        encoder = bench.encoder
         if encoder is None:
             return
         if not encoder.line.is_there:
             path = encoder.settings.path
-            recorder.report(f"the stage's encoder is unplugged ({encoder.last_problem}): plug {path} in again")
-        elif encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
+            bench.report(f"the stage's encoder is unplugged ({encoder.last_problem}): plug {path} in again")
+        elif encoder.silent_for_s(bench.clock.now_s()) > SILENT_S:
             path = encoder.settings.path
-            recorder.report(f"no count arrives from the stage's encoder on {path}: check its power and cable")
+            bench.report(f"no count arrives from the stage's encoder on {path}: check its power and cable")
         else:
             return
         answers = {GO_ON: "check again", WITHOUT: "use the force alone"}
-        if attempt > MOST_ATTEMPTS or recorder.ask("Does the encoder send again?", answers) == WITHOUT:
+        if attempt > MOST_ATTEMPTS or bench.ask("Does the encoder send again?", answers) == WITHOUT:
             encoder.close()
-            recorder.encoder = None
-            recorder.report(
+            bench.encoder = None
+            bench.report(
                 "going on without the position: the next trials need a stage of one speed, not one pushed by hand"
             )
-        recorder.listen(LISTENING_S)
+        bench.listen(LISTENING_S)
 
 
 # checks

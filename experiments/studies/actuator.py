@@ -11,16 +11,17 @@ from typing import Annotated, Any
 
 from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import JOINTS
-from experiments.actuator.bench import RobotBench, SimulatedBench
-from experiments.actuator.configuration_change import apply_fits, find_target
-from experiments.actuator.fit import fit_joint
-from experiments.actuator.plan import PAPER_TRIALS, PAPER_WEIGHTS_G, Plan
-from experiments.actuator.report import list_left_out, list_remarks, make_result
+from experiments.actuator.bench import attended, weigh_on_robot, weigh_simulated
+from experiments.actuator.configuration_change import apply_changes, find_target, fitted_changes
+from experiments.actuator.fit import fit_joints
+from experiments.actuator.plan import PAPER_TRIALS, PAPER_WEIGHTS_G, WeighingPlan
+from experiments.actuator.report import make_result
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Ending, Session
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
@@ -58,16 +59,10 @@ def study(
     seed: Annotated[int, Option("of the simulated motor")] = 1,
 ) -> Result:
     """Weights on a joint: torque constants and friction."""
-    if session.simulated:
-        configuration = load_configuration(config) if config else bench_configuration()
-        bench: RobotBench | SimulatedBench = SimulatedBench(configuration, seed, session)
-    else:
-        assert session.socket is not None
-        bench = RobotBench(DaemonRobot(session.socket), session)
-    try:
-        configuration = bench.configuration
-        target = find_target(config or INSTALLED, configuration.text, session) if apply else None
-        plan = Plan(
+
+    def prepare(configuration: Configuration) -> tuple[Path | None, WeighingPlan]:
+        """Return the file to change, and the plan for this robot."""
+        return find_target(config or INSTALLED, configuration.text, session) if apply else None, WeighingPlan(
             joints=tuple(dict.fromkeys(joint)),
             weights_g=weights,
             trials=trials,
@@ -76,15 +71,20 @@ def study(
             lever_tolerance_m=lever_tolerance / 1000.0,
             weight_tolerance=weight_tolerance / 100.0,
         )
-        readings = bench.calibrate(plan)
-    finally:
-        logs = bench.leave()
-    fits = [
-        fit
-        for name in plan.joints
-        if (fit := fit_joint(name, plan, readings[name], configuration.drive[name].torque_constant_nm_a)) is not None
-    ]
-    applied, ending = apply_fits(target, fits, session) if target else ("", Ending.DONE)
-    notes = [*list_remarks(plan.joints, fits, len(list_left_out(plan, readings))), *filter(None, [applied])]
-    result = make_result(plan, readings, fits, applied or None, session.simulated)
-    return replace(result, notes=notes, logs=logs, ending=ending)
+
+    if session.simulated:
+        configuration = load_configuration(config) if config else bench_configuration()
+        target, plan = prepare(configuration)
+        readings, logs = weigh_simulated(configuration, plan, session, seed)
+    else:
+        assert session.socket is not None
+        robot = DaemonRobot(session.socket)
+        with attended(robot, session) as logs:
+            configuration = robot.configuration
+            target, plan = prepare(configuration)
+            readings = weigh_on_robot(robot, plan, session)
+    fits = fit_joints(plan, readings, configuration)
+    applied, ending = None, Ending.DONE
+    if target:
+        applied, ending = apply_changes(target, fitted_changes(fits, session), session)
+    return replace(make_result(plan, readings, fits, applied, session.simulated), logs=logs, ending=ending)

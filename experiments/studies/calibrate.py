@@ -11,11 +11,11 @@ from typing import Annotated, Any
 
 from control.records import JOINTS
 from experiments.actuator.configuration_change import find_target
-from experiments.actuator.plan import Plan, require_possible
+from experiments.actuator.plan import WeighingPlan, require_possible
 from experiments.actuator.simulation import bench_configuration
-from experiments.calibration.calibration import Calibration
+from experiments.calibration.calibration import calibrate_robot
 from experiments.calibration.report import FILES as FILES
-from experiments.calibration.robots import CalibratedRobot, RealRobot, SimulatedRobot, build_with_errors
+from experiments.calibration.robots import CalibratedRobot, build_with_errors
 from experiments.studies.actuator import INSTALLED, Lever, parse_weights
 from experiments.study.option import Option
 from experiments.study.result import Result
@@ -48,7 +48,7 @@ def study(
     configuration = bench_configuration() if is_bench else load_configuration(config or INSTALLED)
     target = find_target(config or INSTALLED, configuration.text, session)
     joints = joint or configuration.rig.joints
-    plan = Plan(
+    plan = WeighingPlan(
         joints=tuple(dict.fromkeys(joints)),
         weights_g=weights,
         trials=trials,
@@ -58,8 +58,7 @@ def study(
         trusts_constant=False,
     )
     require_possible(plan, configuration)
-    robot: CalibratedRobot = RealRobot(session)
-    if session.simulated:
-        robot = SimulatedRobot(session, build_with_errors(configuration, seed), seed, practise)
-    result = Calibration(session, robot, configuration, plan).run(operator or getuser(), target)
+    built = build_with_errors(configuration, seed) if session.simulated else None
+    robot = CalibratedRobot(session, built, seed, practise)
+    result = calibrate_robot(robot, configuration, plan, operator or getuser(), target)
     return replace(result, title=f"{result.title} (practised)") if practise else result

@@ -13,14 +13,13 @@ from typing import Annotated, Any
 
 from drivers.load_cell.line_formats import AUTO, UNITS, LineFormat
 from drivers.load_cell.stage_encoder import StageEncoderSettings
-from experiments.loadcell.comparison import load_flipper
 from experiments.loadcell.devices import describe_cell, open_bench
 from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import RAW
-from experiments.loadcell.report import evaluate_muds, make_result
-from experiments.loadcell.stage import clay_truth, water_of
+from experiments.loadcell.report import evaluate_muds, load_flipper, make_result
+from experiments.loadcell.stage import TrialPlan, clay_truth, water_of
 from experiments.loadcell.strokes import StageSettings
-from experiments.loadcell.trials import TrialPlan, measure_all
+from experiments.loadcell.trials import measure_all
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Notebook
 from experiments.study.option import Option, OptionError
@@ -83,14 +82,16 @@ def study(
     position_baud: Baud = 115200,
     position_label: Annotated[str, Option("at the beginning of each of its lines", metavar="TEXT")] = "",
     compare: Annotated[Path | None, Option("summary.json of the flipper experiment")] = None,
+    practise: Annotated[bool, Option("on a simulated bench, whose stage obeys the prompts")] = False,
     seed: Annotated[int, Option("of the simulation")] = 1,
 ) -> Result:
     """A mud's coefficients from a load cell on a linear stage."""
+    session = session._replace(simulated=session.simulated or practise)
     if session.simulated:
         port, position = None, position if position is None else ""
         position_step = position_step or SIMULATED_STEP_UM
     elif port is None:
-        raise OptionError("name the serial port of the load cell with --port, or use --simulated")
+        raise OptionError("name the serial port of the load cell with --port, or use --simulated or --practise")
     try:
         _check_lines(format, unit)
         muds = _checked_muds(mud, session.simulated)
@@ -105,9 +106,11 @@ def study(
         calibration=calibration,
         encoder=_encoder(port, position, position_step, position_baud, position_label),
         seed=seed,
+        practises=practise,
     )
     plan = TrialPlan(muds, trials, _stage_settings(plate, depth, speed), depth_error / 1000.0)
-    return _run(session, plan, cell, {} if compare is None else load_flipper(compare))
+    result = _run(session, plan, cell, {} if compare is None else load_flipper(compare))
+    return replace(result, title=f"{result.title} (practised)") if practise else result
 
 
 def _check_lines(format_name: str, unit: str) -> None:
@@ -169,10 +172,10 @@ def _run(session: Session, plan: TrialPlan, cell: CellSettings, flipper: dict[st
             report(f"{without} of them have no measured position; their depth is found from the force")
     used = {**bench, "port": cell.port, "baud": cell.baud, "format": cell.format_name}
     if missing:
-        with open_bench(session, plan, cell, notebook) as trial_bench:
-            prepare_cell(trial_bench, cell)
-            measure_all(trial_bench)
-            used |= describe_cell(trial_bench.recorder)
+        with open_bench(session, plan, cell, notebook) as opened:
+            prepare_cell(opened, cell)
+            measure_all(opened)
+            used |= describe_cell(opened)
     results = evaluate_muds(session.folder, notebook, plan, session.show)
     if not results.trials:
         raise BenchError("no trial counts, so there is nothing to evaluate")

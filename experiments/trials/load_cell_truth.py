@@ -12,10 +12,10 @@ is 1 to 6 % more than the upright plate's at each of these depths.)
 from math import cos, fsum, isfinite, sin
 
 from control.geometry import FlipperGeometry
-from control.plate_integrals import SubmergedPlate, submerged_part
+from control.plate_integrals import submerged_part
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
-from simulation.test_rig.joint_cell import measure_arc
-from simulation.test_rig.load_cell import measure_insertion, measure_shear
+from simulation.test_rig.joint_cell import JointCell, measure_stroke
+from simulation.test_rig.load_cell import LoadCell, measure_shear
 
 PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip
 SHEAR_PATH_M = 0.08
@@ -56,20 +56,14 @@ def _stiffness(
     """Return k of F = k V or τ = k Φ in a stroke down (sign 1) or up (sign -1), by least squares from the surface."""
     if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
         return None
-    deepest_m, motion = stroke.deepest_m, (stroke.deepest_m, stroke.speed_m_s, relaxation, hold_s)
-    fitted_m = deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * deepest_m
-    rows: list[tuple[float, float]] = []  # V and F, or Φ and τ
+    cell: LoadCell | JointCell = JointCell(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, relaxation)
     if upright:
-        straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, *motion)
-        for depth_m, force_n in zip(*(straight.down if sign > 0.0 else straight.up), strict=True):
-            if 0.0 < depth_m <= fitted_m:
-                rows.append((geometry.plate_thickness_m * _plate(geometry, 0.0, depth_m).area_m2, force_n))
-    else:
-        arc = measure_arc(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, *motion)
-        curve = zip(*(arc.down if sign > 0.0 else arc.up), strict=True)
-        rows = [(moment_m4, moment_nm) for depth_m, moment_m4, moment_nm in curve if 0.0 < depth_m <= fitted_m]
-    square = fsum(x * x for x, _ in rows)
-    return fsum(x * sign * y for x, y in rows) / square if square > 0.0 else None
+        cell = LoadCell(stride.clay, geometry, 0.0, 0.0, relaxation)
+    down, up = measure_stroke(cell, stroke.deepest_m, stroke.speed_m_s, hold_s)
+    fitted_m = stroke.deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * stroke.deepest_m
+    rows = [row for row in (down if sign > 0.0 else up) if 0.0 < row[0] <= fitted_m]
+    square = fsum(law * law for _, law, _ in rows)
+    return fsum(law * sign * load for _, law, load in rows) / square if square > 0.0 else None
 
 
 def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> float | None:
@@ -79,9 +73,5 @@ def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> flo
     speed_m_s = stroke.speed_m_s if isfinite(stroke.speed_m_s) else PAPER_SPEED_M_S
     adduction_rad = 0.0 if upright else stroke.adduction_rad
     force_n = measure_shear(stride.clay, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_PATH_M)
-    return force_n / _plate(geometry, adduction_rad, stroke.mean_depth_m).depth_moment_m3
-
-
-def _plate(geometry: FlipperGeometry, adduction_rad: float, depth_m: float) -> SubmergedPlate:
-    """Return the plate perpendicular to its motion."""
-    return submerged_part(geometry, depth_m, -sin(adduction_rad), cos(adduction_rad))
+    across = submerged_part(geometry, stroke.mean_depth_m, -sin(adduction_rad), cos(adduction_rad))
+    return force_n / across.depth_moment_m3

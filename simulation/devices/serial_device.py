@@ -12,9 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
-from typing import Annotated
 
-from control.bounds import Bounds
 from simulation.devices.pseudo_terminal import PseudoTerminal
 
 SPEEDS = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
@@ -23,12 +21,12 @@ DELIVERED_S = 1.0  # longest that the kernel takes to carry a line across a pseu
 
 @dataclass(frozen=True)
 class TalkerParameters:
-    rate_hz: Annotated[float, Bounds(1.0, 1000.0)] = 100.0
-    baud: Annotated[int, Bounds(300, 1000000)] = 115200
-    burst_s: Annotated[float, Bounds(0.0, 0.2)] = 0.016  # of the adapter's latency timer
-    drop_out_rate_hz: Annotated[float, Bounds(0.0, 10.0)] = 0.0
-    drop_out_s: Annotated[float, Bounds(0.0, 10.0)] = 0.2
-    garbled_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.0
+    rate_hz: float = 100.0
+    baud: int = 115200
+    burst_s: float = 0.016  # of the adapter's latency timer
+    drop_out_rate_hz: float = 0.0
+    drop_out_s: float = 0.2
+    garbled_fraction: float = 0.0
 
 
 class SerialTalker:
@@ -43,7 +41,6 @@ class SerialTalker:
         self.parameters = parameters
         self.line_at = line_at
         self.link = link
-        self.waits_for_delivery = True  # the reader reads between two steps and must find all written bytes
         self.lost_lines = 0  # that were not read in time
         self._random = random
         self._terminal: PseudoTerminal | None = None
@@ -97,7 +94,10 @@ class SerialTalker:
         return bytes(self._random.choice((0x00, 0x80, 0xE0, 0xF8, 0xFE, 0xFF, 0x9C, 0x66, 0x1E)) for _ in range(length))
 
     def deliver(self) -> None:
-        """Write the buffer and wait until it can be read: a pseudo-terminal delivers a moment later."""
+        """Write the buffer and wait until it can be read: a pseudo-terminal delivers a moment later.
+
+        The reader reads between two steps and must find all written bytes.
+        """
         terminal = self._terminal
         if terminal is None or not self.waiting:
             return
@@ -105,7 +105,7 @@ class SerialTalker:
         written = terminal.write(waiting)
         self.lost_lines += waiting[written:].count(b"\n")
         deadline_s = time.monotonic() + DELIVERED_S
-        while self.waits_for_delivery and terminal.unread_bytes < before + written and time.monotonic() < deadline_s:
+        while terminal.unread_bytes < before + written and time.monotonic() < deadline_s:
             time.sleep(0.00002)
 
     def close(self) -> None:

@@ -10,25 +10,22 @@ from dataclasses import dataclass
 from math import fsum
 from pathlib import Path
 from random import Random
-from typing import Annotated
 
-from control.bounds import Bounds
 from simulation.devices.serial_device import SerialTalker, TalkerParameters
 
-STYLES = ("counts", "newtons", "indicator", "columns")
 LARGEST_COUNT = 2**23
 
 
 @dataclass(frozen=True)
 class AmplifierParameters(TalkerParameters):
-    rate_hz: Annotated[float, Bounds(1.0, 1000.0)] = 80.0  # of an HX711 with its rate pin high; 10 with it low
-    style: str = "counts"
-    counts_per_newton: Annotated[float, Bounds(-1e6, 1e6)] = 42000.0  # a cell of 20 N, 2 mV/V, and gain 128
-    zero_counts: Annotated[float, Bounds(-8e6, 8e6)] = 81000.0
-    noise_n: Annotated[float, Bounds(0.0, 1.0)] = 0.008  # of the mounted cell: the stage shakes more than the chip
-    drift_n_s: Annotated[float, Bounds(-1.0, 1.0)] = 0.0
-    averaged: Annotated[int, Bounds(1, 64)] = 1  # conversions in the mean that an indicator's filter prints
-    range_n: Annotated[float, Bounds(0.0, 1e4)] = 20.0  # beyond it the cell is overloaded
+    rate_hz: float = 80.0  # of an HX711 with its rate pin high; 10 with it low
+    style: str = "counts"  # or newtons, indicator, columns
+    counts_per_newton: float = 42000.0  # a cell of 20 N, 2 mV/V, and gain 128
+    zero_counts: float = 81000.0
+    noise_n: float = 0.008  # of the mounted cell: the stage shakes more than the chip
+    drift_n_s: float = 0.0
+    averaged: int = 1  # conversions in the mean that an indicator's filter prints
+    range_n: float = 20.0  # beyond it the cell is overloaded
 
 
 class EmulatedAmplifier(SerialTalker):
@@ -71,8 +68,8 @@ class EmulatedAmplifier(SerialTalker):
 
 @dataclass(frozen=True)
 class StageEncoderParameters(TalkerParameters):
-    burst_s: Annotated[float, Bounds(0.0, 0.2)] = 0.004  # another adapter than the load cell's
-    metres_per_count: Annotated[float, Bounds(1e-8, 0.01)] = 1e-5
+    burst_s: float = 0.004  # another adapter than the load cell's
+    metres_per_count: float = 1e-5
     label: str = ""
 
 

@@ -8,29 +8,16 @@ forces within the plate's plane. The contact model is the same as under the robo
 """
 
 from math import degrees, hypot
-from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import stroke_moment_m4, submerged_plate
 from simulation.mud.clay import Clay
 from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, plate_size, twist_of
 from simulation.mud.plate_contact import PlateContact
+from simulation.test_rig.load_cell import Curve, LoadCell
 
 STEP_M = 0.0001
 HOLD_STEP_S = 0.0005
-
-
-class ArcCurve(NamedTuple):
-    """One pose after the other, in the order of time."""
-
-    depths_m: list[float]  # of the lower edge's middle below the surface
-    moments_m4: list[float]  # Φ of control/plate
-    moments_nm: list[float]  # that lift the plate
-
-
-class ArcStroke(NamedTuple):
-    down: ArcCurve
-    up: ArcCurve
 
 
 class JointCell:
@@ -48,25 +35,20 @@ class JointCell:
         self._adduction_rad = self._angle_at_rad(self.clear_m)
         self._depth_m = self.clear_m
 
-    @property
-    def deepest_m(self) -> float:
-        """The greatest depth below the surface that the arm reaches."""
-        return self._geometry.deepest_m(degrees(abs(self._sweep_rad))) - self._surface_m
-
     def _angle_at_rad(self, depth_m: float) -> float:
         return self._geometry.adduction_rad(self._sweep_rad, depth_m + self._surface_m)
 
-    def move(self, to_depth_m: float, speed_m_s: float) -> ArcCurve:
-        """Move down or up, in whole steps of depth."""
-        from_m, path_m = self._depth_m, to_depth_m - self._depth_m
+    def lower(self, to_depth_m: float, speed_m_s: float) -> Curve:
+        """Move down or up, at most to the arm's reach, in whole steps of depth."""
+        deepest_m = self._geometry.deepest_m(degrees(abs(self._sweep_rad))) - self._surface_m
+        from_m, path_m = self._depth_m, min(to_depth_m, deepest_m) - self._depth_m
         steps = max(1, round(abs(path_m) / STEP_M))
-        curve = ArcCurve([], [], [])
+        curve: Curve = []
         for step in range(1, steps + 1):
             self._depth_m = from_m + path_m * step / steps
-            curve.moments_nm.append(self._turn(self._angle_at_rad(self._depth_m), speed_m_s))
+            lifting_nm = self._turn(self._angle_at_rad(self._depth_m), speed_m_s)
             plate = submerged_plate(self._geometry, self._sweep_rad, self._adduction_rad, self._surface_m)
-            curve.moments_m4.append(stroke_moment_m4(self._geometry, plate, self._sweep_rad))
-            curve.depths_m.append(self._depth_m)
+            curve.append((self._depth_m, stroke_moment_m4(self._geometry, plate, self._sweep_rad), lifting_nm))
         return curve
 
     def hold(self, hold_s: float) -> None:
@@ -89,18 +71,10 @@ class JointCell:
         return contact_force(geometry, sweep_rad, within).adduction_nm
 
 
-def measure_arc(
-    clay: Clay,
-    geometry: FlipperGeometry,
-    sweep_rad: float,
-    surface_m: float,
-    depth_m: float,
-    speed_m_s: float,
-    relaxation: float = 0.0,
-    hold_s: float = 0.0,
-) -> ArcStroke:
-    """Measure from free air down to `depth_m` below the surface, or to the arm's reach; after a hold, up again."""
-    cell = JointCell(clay, geometry, sweep_rad, surface_m, relaxation)
-    down = cell.move(min(depth_m, cell.deepest_m), speed_m_s)
+def measure_stroke(
+    cell: LoadCell | JointCell, depth_m: float, speed_m_s: float, hold_s: float = 0.0
+) -> tuple[Curve, Curve]:
+    """Measure from just above the mud down to a depth, and after a hold up again."""
+    down = cell.lower(depth_m, speed_m_s)
     cell.hold(hold_s)
-    return ArcStroke(down, cell.move(cell.clear_m, speed_m_s))
+    return down, cell.lower(cell.clear_m, speed_m_s)

@@ -12,9 +12,9 @@ and its height along
 """
 
 from math import ceil, cos, fsum
-from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
+from control.plate_integrals import submerged_part
 from simulation.mud.carriage import plate_directions
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.flipper_contact import plate_size
@@ -25,17 +25,8 @@ from simulation.mud.rigid_plate import Attitude, Twist, lowest_point_m
 STEP_S = 0.0005
 
 
-class LoadCurve(NamedTuple):
-    """Upward force on the plate against depth, in the order of time."""
-
-    depths_m: tuple[float, ...]
-    forces_n: tuple[float, ...]
-
-
-class Insertion(NamedTuple):
-    down: LoadCurve
-    held: LoadCurve
-    up: LoadCurve
+# depth, submerged volume and upward force in the order of time; of a joint's cell Φ (control/plate) and the moment
+Curve = list[tuple[float, float, float]]
 
 
 class LoadCell:
@@ -45,7 +36,7 @@ class LoadCell:
         self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
     ) -> None:
         self.axes = plate_directions(sweep_rad, adduction_rad)
-        self.clay = clay
+        self.clay, self._geometry = clay, geometry
         self.plate = PlateContact(plate_size(geometry), relaxation)
         self._upright = Attitude(0.0, -self.axes[1][2], self.axes[2][2])
         self.clear_m = -lowest_point_m(self._upright, self.plate.size)  # depth at which the plate is just out
@@ -64,38 +55,20 @@ class LoadCell:
         forward_n = fsum(force_n * axis[0] for force_n, axis in zip(forces_n, self.axes, strict=True))
         return forward_n, fsum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
 
-    def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
+    def lower(self, to_depth_m: float, speed_m_s: float) -> Curve:
         """Move straight down or up to a depth, in whole steps."""
         path_m = to_depth_m - self.depth_m
         steps = max(1, ceil(abs(path_m) / (speed_m_s * STEP_S)))
-        return self._record(steps, -path_m / (steps * STEP_S))
-
-    def hold(self, hold_s: float) -> LoadCurve:
-        return self._record(round(hold_s / STEP_S), 0.0)
-
-    def _record(self, steps: int, upward_m_s: float) -> LoadCurve:
-        depths_m, forces_n = [], []
+        curve: Curve = []
         for _ in range(steps):
-            forces_n.append(self.step(STEP_S, 0.0, upward_m_s)[1])
-            depths_m.append(self.depth_m)
-        return LoadCurve(tuple(depths_m), tuple(forces_n))
+            upward_n = self.step(STEP_S, 0.0, -path_m / (steps * STEP_S))[1]
+            part = submerged_part(self._geometry, self.depth_m, self._upright.per_outward, self._upright.per_upward)
+            curve.append((self.depth_m, self._geometry.plate_thickness_m * part.area_m2, upward_n))
+        return curve
 
-
-def measure_insertion(
-    clay: Clay,
-    geometry: FlipperGeometry,
-    sweep_rad: float,
-    adduction_rad: float,
-    depth_m: float,
-    speed_m_s: float,
-    relaxation: float = 0.0,
-    hold_s: float = 0.0,
-) -> Insertion:
-    """Measure the force from just above the mud down to `depth_m`, during a hold, and up again."""
-    cell = LoadCell(clay, geometry, sweep_rad, adduction_rad, relaxation)
-    down = cell.lower(depth_m, speed_m_s)
-    held = cell.hold(hold_s)
-    return Insertion(down, held, cell.lower(cell.clear_m, speed_m_s))
+    def hold(self, hold_s: float) -> None:
+        for _ in range(round(hold_s / STEP_S)):
+            self.step(STEP_S, 0.0, 0.0)
 
 
 def measure_shear(

@@ -44,7 +44,6 @@ class Move(NamedTuple):
 
 class StageParameters(NamedTuple):
     acceleration_m_s2: float = 2.0
-    cell_sign: float = 1.0  # -1: the cell is mounted the other way round
     manual: ManualMotionParameters | None = None  # pushed by hand, except to lower and lift
     seed: int = 1  # of the manual motion
 
@@ -124,8 +123,8 @@ class PlateStage:
             self._time_s = until_s
         start_s, sum_ns = self._time_s, 0.0
         while self._time_s < until_s - 1e-9:
-            sum_ns += self._step(until_s) * self.parameters.cell_sign
-        return sum_ns / (until_s - start_s) if until_s > start_s else self.force_n * self.parameters.cell_sign
+            sum_ns += self._step(until_s)
+        return sum_ns / (until_s - start_s) if until_s > start_s else self.force_n
 
     def _step(self, until_s: float) -> float:
         """Advance to the next change of motion and return force times time."""

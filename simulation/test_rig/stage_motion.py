@@ -8,9 +8,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import sqrt
 from random import Random
-from typing import Annotated, NamedTuple, Protocol
-
-from control.bounds import Bounds
+from typing import NamedTuple, Protocol
 
 
 class Motion(Protocol):
@@ -44,14 +42,14 @@ class RampedMotion:
 
 @dataclass(frozen=True)
 class ManualMotionParameters:
-    slowest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.05
-    fastest_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.2
-    acceleration_m_s2: Annotated[float, Bounds(0.1, 50.0)] = 4.0
-    shortest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.002  # distance at one speed
-    longest_m: Annotated[float, Bounds(0.001, 0.1)] = 0.01
-    rest_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.25  # of the changes of speed that begin with a rest
-    shortest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.05
-    longest_rest_s: Annotated[float, Bounds(0.0, 5.0)] = 0.5
+    slowest_m_s: float = 0.05
+    fastest_m_s: float = 0.2
+    acceleration_m_s2: float = 4.0
+    shortest_m: float = 0.002  # distance at one speed
+    longest_m: float = 0.01
+    rest_fraction: float = 0.25  # of the changes of speed that begin with a rest
+    shortest_rest_s: float = 0.05
+    longest_rest_s: float = 0.5
 
 
 class _Knot(NamedTuple):

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from control.records import JOINTS
-from experiments.bench.reading import Reading
+from experiments.bench.reading import BenchReading
 from experiments.reports.text_tables import table
 
 ROBOT = "robot"  # the column of readings that belong to no joint
 HEADS = {ROBOT: ROBOT} | {joint: f"{joint[0]}. {joint.split('_')[1].replace('duction', 'd.')}" for joint in JOINTS}
 
 
-def table_lines(heading: str, readings: Sequence[Reading]) -> Iterator[tuple[str, bool]]:
+def table_lines(heading: str, readings: Sequence[BenchReading]) -> Iterator[tuple[str, bool]]:
     """Yield each line, and whether its readings are good; yield nothing without readings."""
-    by_row: dict[tuple[str, str], dict[str, Reading]] = {}
+    by_row: dict[tuple[str, str], dict[str, BenchReading]] = {}
     for reading in readings:
         joint, _, rest = reading.what.partition(": ")
         column, what = (joint, rest) if joint in JOINTS else (ROBOT, reading.what)

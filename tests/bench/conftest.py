@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
+from experiments.bench.operator import BenchOperator
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig, on_channels
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -67,15 +68,13 @@ def opened(request: pytest.FixtureRequest) -> Iterator[TestRig | str]:
         return
     robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
     if isinstance(rig, SimulatedRig):
-        bench_operator = SimulatedBenchOperator(rig)
+        bench_operator = simulated_operator(rig)
     assert bench_operator is not None
-    test_rig = TestRig(rig, bench_operator)
-    try:
-        yield test_rig
-    finally:
-        test_rig.force_idle()
-        rig.close()
-        robot["lateness"] = vars(test_rig.lateness_so_far)
+    with TestRig(rig, bench_operator) as test_rig:
+        try:
+            yield test_rig
+        finally:
+            robot["lateness"] = vars(test_rig.lateness_so_far)
 
 
 def operator_at(config: pytest.Config) -> BenchOperator:
@@ -87,7 +86,7 @@ def operator_at(config: pytest.Config) -> BenchOperator:
     if capture is not None:
         capture.resume()
     if has_terminal:
-        return PromptedBenchOperator(UncapturedOperator(config), config.option.yes)
+        return BenchOperator(UncapturedOperator(config), config.option.yes)
     if config.option.yes:
         return BenchOperator()
     raise BenchError(

@@ -12,7 +12,7 @@ import pytest
 
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.bench.measured_check import UnfinishedCheckError, measure_check
-from experiments.bench.reading import Reading, Readings
+from experiments.bench.reading import BenchReading, BenchReadings
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import EndedError
 from tests.bench.bench_table import table_lines
@@ -57,7 +57,7 @@ class BenchReport:
         names = {"stage": stage, "name": STAGES[stage - 1], "test": test}
         self._test = names | {"outcome": PASSED, "why": "", "spoiled": [], "readings": []}
 
-    def add(self, reading: Reading) -> None:
+    def add(self, reading: BenchReading) -> None:
         """Add a reading of the running test."""
         if self._test is not None:
             self._test["readings"].append(reading)
@@ -151,7 +151,7 @@ class StagedBench:
         self.report = report
 
     def check(
-        self, measure: Callable[Concatenate[TestRig, P], Readings], *arguments: P.args, **named: P.kwargs
+        self, measure: Callable[Concatenate[TestRig, P], BenchReadings], *arguments: P.args, **named: P.kwargs
     ) -> None:
         """Record the readings, and fail with a message for each one out of bounds.
 
@@ -169,7 +169,7 @@ class StagedBench:
         if measured.problem:
             pytest.fail(measured.problem, pytrace=False)
 
-    def _add(self, readings: Iterable[Reading]) -> None:
+    def _add(self, readings: Iterable[BenchReading]) -> None:
         for reading in readings:
             self.report.add(reading)
 

@@ -10,10 +10,10 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.actuator.configuration_change import apply_fits, find_target
-from experiments.actuator.fit import fit_joint
+from experiments.actuator.configuration_change import apply_changes, find_target, fitted_changes
+from experiments.actuator.fit import JointFit, fit_joint
 from experiments.actuator.friction import QUICK, SLOW
-from experiments.actuator.plan import Plan
+from experiments.actuator.plan import WeighingPlan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -129,6 +129,10 @@ def read_plan(folder: Path) -> dict[str, object]:
 # the configuration
 
 
+def apply_fit(path: Path, fit: JointFit, session: Session) -> tuple[str, Ending]:
+    return apply_changes(path, fitted_changes([fit], session), session)
+
+
 def make_session(folder: Path, messages: list[str]) -> Session:
     return Session(folder, AutomaticOperator(messages.append), lambda done, total: None)
 
@@ -152,15 +156,15 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 
 
 def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
-    path, plan, reported = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
+    path, plan, reported = tmp_path / "mudskipper.toml", WeighingPlan(("right_sweep",), trials=4), list[str]()
     path.write_text(example_text, encoding="utf-8")
     uncertain, good = (
         fit_joint("right_sweep", plan, make_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02)
     )
     assert uncertain is not None and good is not None
-    assert "needs no change" in apply_fits(path, [uncertain], make_session(tmp_path, reported))[0]
+    assert "needs no change" in apply_fit(path, uncertain, make_session(tmp_path, reported))[0]
     assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in apply_fits(path, [good], make_session(tmp_path, reported))[0]
+    assert "is changed" in apply_fit(path, good, make_session(tmp_path, reported))[0]
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
@@ -169,11 +173,11 @@ def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, 
 
 
 def test_a_fit_that_cannot_be_applied_is_still_reported(tmp_path: Path, example_text: str) -> None:
-    plan, path = Plan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
+    plan, path = WeighingPlan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
     path.write_text(example_text, encoding="utf-8")
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in make_entries(plan).items()}
     fit = fit_joint("right_sweep", plan, entries, 0.083)
     assert fit is not None
-    message, ending = apply_fits(path, [fit], make_session(tmp_path, []))
+    message, ending = apply_fit(path, fit, make_session(tmp_path, []))
     assert message.startswith("nothing was applied: the configuration stays as it is")
     assert "current_limit_a" in message and "run the same command again" in message and ending is Ending.REFUSED

@@ -16,6 +16,7 @@ from simulation.mud.clay import clay_of_water
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 from simulation.test_rig.load_cell import measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE
+from tests.command_line.experiments.test_conduct import typed
 
 SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
 PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}
@@ -155,3 +156,15 @@ def test_a_missing_port_of_an_encoder_is_reported(tmp_path: Path, capsys: pytest
     cell.close()
     assert status == exit_codes.REFUSED
     assert "the stage's encoder: there is no serial port" in reported and "continue without --position" in reported
+
+
+def test_a_person_practises_on_a_bench_that_obeys_the_prompts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two weights; a shear: ready, lowered, lifted; an insertion: skipped."""
+    with typed(monkeypatch, "0\n500\n\n\n\ns\n"):
+        status, data, asked = run(capsys, *SHORT[:2], "--practise", *SHORT[3:], "--out", str(tmp_path / "out"))
+    report = json.loads(data)
+    assert status == exit_codes.OK and "Lower the plate 3 cm" in asked and "Recording" in asked
+    assert report["muds"][0]["k_s"]["value"] == pytest.approx(report["truth"]["48.6"]["k_s"], rel=0.03)
+    assert list(report["left_out"]) == ["48.6/insertion/1"]

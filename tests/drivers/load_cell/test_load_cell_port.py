@@ -10,6 +10,7 @@ import pytest
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
+from drivers.serial.serial_line import text_fraction
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 from tests.drivers.load_cell.instrument_bench import InstrumentBench
 
@@ -55,8 +56,8 @@ def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) 
 def test_another_baud_rate_is_no_text(tmp_path: Path) -> None:
     cable = Cable(tmp_path, baud=9600)
     assert cable.run(2.0) == []
-    assert cable.port.arrivals.text < 0.5
-    assert cable.port.arrivals.readable == 0.0
+    assert text_fraction(cable.port.line.recent) < 0.5
+    assert cable.port.readable_fraction == 0.0
     cable.close()
 
 

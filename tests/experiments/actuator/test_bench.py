@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from experiments.actuator.bench import FALLS, RobotBench
-from experiments.actuator.plan import Plan
+from experiments.actuator.bench import FALLS, attended, weigh_on_robot
+from experiments.actuator.plan import WeighingPlan
 from experiments.actuator.simulation import simulated_bench
 from experiments.robot.bench_errors import BenchError, RobotInUseError
 from experiments.robot.bench_robot import arm
@@ -20,7 +20,7 @@ from tests.folders import EXAMPLE_CONFIGURATION
 from tests.scripted_operator import ScriptedOperator
 
 HOLD_IT = "Take off the weight and hold the flipper: torque goes off."
-PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
+PLAN = WeighingPlan(("right_adduction",), weights_g=(50.0,), trials=1)
 
 
 class HoldingRobot(StillRobot):
@@ -63,14 +63,19 @@ class Holding(ScriptedOperator):
         return super().ask(question, answers, meanwhile)
 
 
-def bench_of(robot: HoldingRobot, operator: ScriptedOperator, folder: Path) -> RobotBench:
-    return RobotBench(robot, Session(folder, operator, lambda done, total: None))
+def session_of(operator: ScriptedOperator, folder: Path) -> Session:
+    return Session(folder, operator, lambda done, total: None)
+
+
+def leave(robot: HoldingRobot, operator: ScriptedOperator, folder: Path) -> None:
+    with attended(robot, session_of(operator, folder)):
+        pass
 
 
 def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_path: Path) -> None:
     robot = HoldingRobot()
     operator = Holding(robot)
-    bench_of(robot, operator, tmp_path).leave()
+    leave(robot, operator, tmp_path)
     assert len(operator.asked) == 1 and operator.asked[0].endswith(HOLD_IT)
     assert robot.mode == "idle" and robot.closed
 
@@ -78,7 +83,7 @@ def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_pat
 def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
-        bench_of(robot, operator, tmp_path).leave()
+        leave(robot, operator, tmp_path)
     assert len(operator.asked) == 1
     assert robot.mode == "idle" and robot.closed
 
@@ -86,7 +91,7 @@ def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None
 def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(RobotInUseError):
-        bench_of(robot, operator, tmp_path).leave()
+        leave(robot, operator, tmp_path)
     assert not operator.asked and robot.mode == "hold" and robot.closed
     assert operator.reported == ["another program operates the robot now: it is left as it is"]
 
@@ -94,11 +99,11 @@ def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> N
 def test_torque_goes_off_and_the_operator_is_warned_before_a_joint_is_mounted(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
-        bench_of(robot, operator, tmp_path).calibrate(PLAN)
+        weigh_on_robot(robot, PLAN, session_of(operator, tmp_path))
     assert operator.asked == [f"The robot holds its pose. {HOLD_IT}"]
     robot.mode = "idle"
     with pytest.raises(KeyboardInterrupt):
-        bench_of(robot, operator, tmp_path).calibrate(PLAN)
+        weigh_on_robot(robot, PLAN, session_of(operator, tmp_path))
     assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[1]
 
 

@@ -14,16 +14,21 @@ from pandas import DataFrame
 from scipy.stats import t as student_t
 
 from experiments.actuator.fit import fit_joint, fit_line, loads_of, repeatability
-from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, steps_of
+from experiments.actuator.plan import PAPER_WEIGHTS_G, WeighingPlan, WeighingStep, steps_of
 
-PLAN = Plan(("right_sweep",), trials=4)
+PLAN = WeighingPlan(("right_sweep",), trials=4)
 TRUE_NM_A, TARE_A = 0.0719, 0.65
 DRY_A, VISCOUS_A_S, REST_A, LESS_A = 0.18, 0.03, 0.15, 0.02
 Entries = dict[str, dict[str, Any]]
 
 
 def make_entries(
-    plan: Plan = PLAN, sign: float = 1.0, noise_a: float = 0.02, seed: int = 1, truth: float = 1.0, hidden: float = 0.0
+    plan: WeighingPlan = PLAN,
+    sign: float = 1.0,
+    noise_a: float = 0.02,
+    seed: int = 1,
+    truth: float = 1.0,
+    hidden: float = 0.0,
 ) -> Entries:
     """Return synthetic readings with a known line and friction.
 
@@ -93,7 +98,7 @@ def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> No
 
 def test_the_tare_of_a_pass_is_the_mean_of_before_and_after() -> None:
     entries = make_entries(noise_a=0.0)
-    entries[Step(0, 0.0).key]["current_a"] += 0.2
+    entries[WeighingStep(0, 0.0).key]["current_a"] += 0.2
     loads = loads_of(PLAN, entries).query("weight_g == 100.0").set_index("trial")
     assert loads.current_a[2] - loads.current_a[1] == pytest.approx(0.1, abs=1e-4)
 
@@ -101,7 +106,10 @@ def test_the_tare_of_a_pass_is_the_mean_of_before_and_after() -> None:
 def test_an_arm_that_may_not_have_been_empty_is_no_tare() -> None:
     entries = make_entries(noise_a=0.0)
     before = loads_of(PLAN, entries)
-    entries[Step(1, 0.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 100 g although the arm should be empty"}
+    entries[WeighingStep(1, 0.0).key] |= {
+        "current_a": 3.0,
+        "doubt": "the motor holds 100 g although the arm should be empty",
+    }
     after = loads_of(PLAN, entries)
     assert list(after.current_a) == pytest.approx(list(before.current_a))
 
@@ -115,7 +123,7 @@ def test_repeatability_is_the_mean_relative_deviation_over_the_trials() -> None:
 
 def test_a_reading_kept_as_doubtful_is_not_fitted() -> None:
     entries = make_entries(noise_a=0.0)
-    entries[Step(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
+    entries[WeighingStep(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
     assert fit is not None and fit.numbers["readings"] == 31
     assert fit.numbers["torque_constant_nm_a"] == pytest.approx(TRUE_NM_A, rel=1e-6)

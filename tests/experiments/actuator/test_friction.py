@@ -10,15 +10,15 @@ import pytest
 
 from experiments.actuator import simulation as actuator_simulation
 from experiments.actuator.friction import friction_of, loop_of, swing_arm
-from experiments.actuator.plan import Plan
-from experiments.actuator.reading import HeldJoint, MovedError, Sample
+from experiments.actuator.plan import WeighingPlan
+from experiments.actuator.reading import HeldJoint, HeldSample, MovedError
 from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
 from experiments.robot.bench_robot import arm
 
 HALF_RAD, DRY_A, VISCOUS_A_S = 0.09, 0.18, 0.03
 
 
-def made_stroke(direction: float, duration_s: float, taken_a: Callable[[float, float], float]) -> list[Sample]:
+def made_stroke(direction: float, duration_s: float, taken_a: Callable[[float, float], float]) -> list[HeldSample]:
     """Return half a cosine from rest to rest; `taken_a` is the current besides friction, by angle and acceleration."""
     samples, rate = [], pi / duration_s
     for number in range(501):
@@ -27,8 +27,8 @@ def made_stroke(direction: float, duration_s: float, taken_a: Callable[[float, f
         velocity_rad_s = direction * HALF_RAD * rate * sin(rate * now_s)
         friction_a = copysign(DRY_A, direction) + VISCOUS_A_S * velocity_rad_s
         load_a = taken_a(angle_rad, -(rate**2) * angle_rad)
-        samples.append(Sample(now_s, angle_rad, load_a + friction_a, 30.0))
-    rest = Sample(2.0 * duration_s, direction * HALF_RAD, load_a, 30.0)
+        samples.append(HeldSample(now_s, angle_rad, load_a + friction_a, 30.0))
+    rest = HeldSample(2.0 * duration_s, direction * HALF_RAD, load_a, 30.0)
     return [*samples, *[rest._replace(now_s=rest.now_s + 0.01 * number) for number in range(60)]]
 
 
@@ -63,18 +63,18 @@ def test_a_blocked_arm_makes_no_loop() -> None:
 def test_a_simulated_joint_has_the_friction_that_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(actuator_simulation, "COULOMB_NM", 0.03)
     joint = "right_sweep"
-    robot, hand = simulated_bench(bench_configuration(), joint, Plan((joint,)), 6, tmp_path / "log.mcap")
+    robot, hand = simulated_bench(bench_configuration(), joint, WeighingPlan((joint,)), 6, tmp_path / "log.mcap")
     try:
-        hand.hold_level(joint, lambda: None)
+        hand.hold_level(lambda: None)
         arm(robot)
         hand.release(lambda: None)
         held = HeldJoint(robot, joint)
         middle_rad = held.held_rad
-        friction = friction_of(swing_arm(held) + swing_arm(held))
+        dry_a, dry_error_a, viscous_a_s, viscous_error_a_s = friction_of(swing_arm(held) + swing_arm(held))
         assert held.held_rad == pytest.approx(middle_rad)
         viscous_nm_s = robot.lockstep.robot.plant.parameters.joint_friction_nm_s
     finally:
         robot.close()
-    assert friction.dry_error_a * TRUE_CONSTANT_NM_A < 0.0015
-    assert abs(friction.dry_a - 0.03 / TRUE_CONSTANT_NM_A) < 2.0 * friction.dry_error_a
-    assert abs(friction.viscous_a_s - viscous_nm_s / TRUE_CONSTANT_NM_A) < 2.0 * friction.viscous_error_a_s
+    assert dry_error_a * TRUE_CONSTANT_NM_A < 0.0015
+    assert abs(dry_a - 0.03 / TRUE_CONSTANT_NM_A) < 2.0 * dry_error_a
+    assert abs(viscous_a_s - viscous_nm_s / TRUE_CONSTANT_NM_A) < 2.0 * viscous_error_a_s

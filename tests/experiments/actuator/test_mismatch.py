@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from experiments.actuator.mismatch import find_mismatch
-from experiments.actuator.plan import Plan, Step
+from experiments.actuator.plan import WeighingPlan, WeighingStep
 from tests.experiments.actuator.test_fit import TARE_A, TRUE_NM_A, Entries, make_entries
 
-PLAN = Plan(("right_sweep",), trials=2)
+PLAN = WeighingPlan(("right_sweep",), trials=2)
 CONFIGURED_NM_A = 0.083
 
 
@@ -16,7 +16,7 @@ def current_a(grams: float, sign: float = 1.0) -> float:
     return sign * (PLAN.torque_nm(grams) / TRUE_NM_A + TARE_A)
 
 
-def before(step: Step, sign: float = 1.0) -> Entries:
+def before(step: WeighingStep, sign: float = 1.0) -> Entries:
     """Return the entries of earlier steps."""
     entries = make_entries(PLAN, sign)
     keys = list(entries)
@@ -26,7 +26,7 @@ def before(step: Step, sign: float = 1.0) -> Entries:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("trial", "weight_g"), [(1, 10.0), (1, 800.0), (2, 100.0), (2, 0.0)])
 def test_the_weight_that_was_asked_for_matches(trial: int, weight_g: float, sign: float) -> None:
-    step = Step(trial, weight_g)
+    step = WeighingStep(trial, weight_g)
     assert find_mismatch(PLAN, before(step, sign), step, current_a(weight_g, sign), CONFIGURED_NM_A) is None
 
 
@@ -34,19 +34,18 @@ def test_the_weight_that_was_asked_for_matches(trial: int, weight_g: float, sign
     ("trial", "asked_g", "hung_g"), [(1, 20.0, 50.0), (1, 400.0, 600.0), (2, 100.0, 50.0), (2, 800.0, 600.0)]
 )
 def test_another_weight_of_the_list_is_named(trial: int, asked_g: float, hung_g: float) -> None:
-    step = Step(trial, asked_g)
+    step = WeighingStep(trial, asked_g)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(hung_g), CONFIGURED_NM_A)
-    assert mismatch is not None and mismatch.other_g == hung_g
+    assert mismatch is not None and mismatch[1] == hung_g
 
 
 def test_a_weight_at_another_lever_matches_nothing() -> None:
-    step = Step(2, 400.0)
+    step = WeighingStep(2, 400.0)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(490.0), CONFIGURED_NM_A)
-    assert mismatch is not None and mismatch.other_g is None
-    assert "g, not 400 g: check that it hangs at 12 cm" in mismatch.message
+    assert mismatch is not None and mismatch[1] is None and "g, not 400 g: check that it hangs at 12 cm" in mismatch[0]
 
 
 def test_an_arm_that_is_not_empty_is_reported() -> None:
-    step = Step(1, 0.0)
+    step = WeighingStep(1, 0.0)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(100.0), CONFIGURED_NM_A)
-    assert mismatch is not None and "should be empty" in mismatch.message
+    assert mismatch is not None and "should be empty" in mismatch[0]

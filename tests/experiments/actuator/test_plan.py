@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.actuator.plan import Plan, require_possible, steps_of
+from experiments.actuator.plan import WeighingPlan, require_possible, steps_of
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 
 
 def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises() -> None:
-    steps = steps_of(Plan(("left_sweep",), weights_g=(400.0, 10.0, 50.0), trials=3))
+    steps = steps_of(WeighingPlan(("left_sweep",), weights_g=(400.0, 10.0, 50.0), trials=3))
     assert [(step.trial, step.weight_g) for step in steps] == [
         (0, 0.0),
         (1, 10.0), (1, 50.0), (1, 400.0), (1, 0.0),
@@ -25,16 +25,16 @@ def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises()
 
 def test_a_weight_beyond_the_torque_limit_is_refused_with_key_value_and_bound(configuration: Configuration) -> None:
     with pytest.raises(BenchError) as refused:
-        require_possible(Plan(("right_sweep",)), configuration)
+        require_possible(WeighingPlan(("right_sweep",)), configuration)
     message = str(refused.value)
     assert "limits.torque_nm = 0.75: must be at least 1.25 for 800 g at 12 cm" in message
     assert "set it to 1.25, current_limit_a of all drives to 18.1" in message  # 17.4 for k_t = 0.0719
     assert "at most 400 g of them" in message
-    require_possible(Plan(("right_sweep",), weights_g=(100.0, 400.0)), configuration)
+    require_possible(WeighingPlan(("right_sweep",), weights_g=(100.0, 400.0)), configuration)
 
 
 def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
     configuration = bench_configuration()
     hot = replace(configuration, winding=replace(configuration.winding, thermal_resistance_k_w=4.0))
     with pytest.raises(BenchError, match=r"winding.thermal_resistance_k_w = 4: 800 g would warm the winding of left_"):
-        require_possible(Plan(("left_sweep",)), hot)
+        require_possible(WeighingPlan(("left_sweep",)), hot)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from control.parameters.arm_mass import GRAVITY_M_S2
-from experiments.actuator.plan import Plan, Step
-from experiments.actuator.reading import HeldJoint, MovedError, Side
+from experiments.actuator.plan import WeighingPlan, WeighingStep
+from experiments.actuator.reading import HeldJoint, MovedError
 from experiments.actuator.simulation import (
     COULOMB_NM,
     TRUE_CONSTANT_NM_A,
@@ -22,6 +22,7 @@ from experiments.actuator.simulation import (
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm
 from experiments.robot.lockstep_robot import LockstepRobot
+from experiments.study.notebook import Entry
 
 
 def nothing() -> None:
@@ -34,9 +35,9 @@ Arm = tuple[LockstepRobot, SimulatedWeights, HeldJoint]
 @contextmanager
 def held_arm(joint: str, seed: int, folder: Path) -> Iterator[Arm]:
     """Yield a simulated robot that holds its empty arm level, the weights for it, and the joint."""
-    robot, hand = simulated_bench(bench_configuration(), joint, Plan((joint,)), seed, folder / "log.mcap")
+    robot, hand = simulated_bench(bench_configuration(), joint, WeighingPlan((joint,)), seed, folder / "log.mcap")
     try:
-        hand.hold_level(joint, nothing)
+        hand.hold_level(nothing)
         arm(robot)
         hand.release(nothing)
         yield robot, hand, HeldJoint(robot, joint)
@@ -48,7 +49,7 @@ def held_arm(joint: str, seed: int, folder: Path) -> Iterator[Arm]:
 def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path) -> None:
     with held_arm(joint, 2, tmp_path) as (_, hand, held):
         empty = held.read()
-        hand.hang(Step(1, 400.0), nothing)
+        hand.hang(WeighingStep(1, 400.0), nothing)
         loaded = held.read()
     external_nm = 0.4 * GRAVITY_M_S2 * hand.mount.lever_m
     sensed_nm = abs(loaded["current_a"] - empty["current_a"]) * TRUE_CONSTANT_NM_A
@@ -63,7 +64,7 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
         plain_wait = robot.wait
 
         def shaken(duration_s: float) -> None:
-            hand.mount.hang(0.1 if int(robot.lockstep.now_s * 4.0) % 2 else 0.3, Plan(()).lever_m)
+            hand.mount.hang(0.1 if int(robot.lockstep.now_s * 4.0) % 2 else 0.3, WeighingPlan(()).lever_m)
             plain_wait(duration_s)
 
         robot.wait = shaken  # type: ignore[method-assign]
@@ -76,10 +77,10 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
 
 
 def test_a_load_that_the_motor_does_not_lift_is_reported(tmp_path: Path) -> None:
-    joint, plan = "right_adduction", Plan(("right_adduction",))
+    joint, plan = "right_adduction", WeighingPlan(("right_adduction",))
     robot, hand = simulated_bench(bench_configuration(), joint, plan, 4, tmp_path / "log.mcap")
     try:
-        hand.hold_level(joint, nothing)
+        hand.hold_level(nothing)
         robot.lockstep.robot.plant.arms[1].adduction_rad = -0.55  # held 30 degrees down
         robot.wait(0.1)
         arm(robot)
@@ -95,10 +96,10 @@ def test_a_weight_that_slips_off_between_the_approaches_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with held_arm("left_adduction", 5, tmp_path) as (_, hand, held):
-        hand.hang(Step(1, 200.0), nothing)
+        hand.hang(WeighingStep(1, 200.0), nothing)
         settled = HeldJoint._settled
 
-        def slipping(self: HeldJoint) -> Side:
+        def slipping(self: HeldJoint) -> Entry:
             side = settled(self)
             hand.take_off()
             return side

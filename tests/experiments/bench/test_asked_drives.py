@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
-from experiments.bench.operator import BenchOperator, SimulatedBenchOperator
-from experiments.bench.reading import Reading
+from experiments.bench.operator import BenchOperator
+from experiments.bench.reading import BenchReading
 from experiments.bench.rig import SimulatedRig
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.stop_check import check_damping
 from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
 from experiments.bench.test_rig import TestRig
@@ -24,13 +25,13 @@ DAMIAO, CUBEMARS = "mit", "mit:AK80-9"
 def test_rig_of(drive: str, **changes: Any) -> TestRig:
     configuration = simulated_configuration(drive_type=drive)
     rig = SimulatedRig(configuration, drives=drives_of(configuration, **changes))
-    return TestRig(rig, SimulatedBenchOperator(rig))
+    return TestRig(rig, simulated_operator(rig))
 
 
 test_rig_of.__test__ = False  # type: ignore[attr-defined]
 
 
-def wrong(readings: list[Reading]) -> list[str]:
+def wrong(readings: list[BenchReading]) -> list[str]:
     return [reading.what for reading in readings if not reading.good]
 
 

@@ -10,9 +10,9 @@ from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
 from control.records import JOINTS, DriveState, same_for_all
 from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake_joint
-from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import check_nudge
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
@@ -34,7 +34,7 @@ class Bench:
         drives = on_blocks(configuration).drives(configuration)
         drives[joint] = replace(drives[joint], encoder_noise_rad=noise_rad)
         self.rig = SimulatedRig(configuration, replace(configuration, arm=mass), drives)
-        self.test_rig = TestRig(self.rig, SimulatedBenchOperator(self.rig))
+        self.test_rig = TestRig(self.rig, simulated_operator(self.rig))
         self.drive = self.rig.robot.drives[index]
         self.farthest_rad = 0.0
         before_rad = self.rig.robot.plant.angles_rad[index]

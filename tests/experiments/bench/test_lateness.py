@@ -12,9 +12,9 @@ from control.records import DriveState, DriveStates, same_for_all
 from experiments.bench.joint_zero_check import check_rest_pose
 from experiments.bench.lateness import LATE_S
 from experiments.bench.measured_check import MOST_MEASURED
-from experiments.bench.operator import SimulatedBenchOperator
-from experiments.bench.reading import Reading, Readings
+from experiments.bench.reading import BenchReading, BenchReadings
 from experiments.bench.rig import SimulatedRig
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.stop_check import OFF_TICKS, check_torque_off
 from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
 from experiments.bench.test_rig import TestRig
@@ -43,10 +43,10 @@ def rig(patient: Configuration) -> LateRig:
 
 @pytest.fixture
 def opened_rig(rig: LateRig) -> TestRig:
-    return TestRig(rig, SimulatedBenchOperator(rig))
+    return TestRig(rig, simulated_operator(rig))
 
 
-def by_name(readings: Readings) -> dict[str, Reading]:
+def by_name(readings: BenchReadings) -> dict[str, BenchReading]:
     return {reading.what: reading for reading in readings}
 
 
@@ -70,7 +70,7 @@ def sinking_rig(configuration: Configuration, sinking: Sinking) -> TestRig:
     drives = on_blocks(configuration).drives(configuration)
     prompt = {joint: replace(each, message_delay_s=0.0) for joint, each in drives.items()}
     rig = SimulatedRig(configuration, drives=prompt, others=[sinking])
-    return TestRig(rig, SimulatedBenchOperator(rig))
+    return TestRig(rig, simulated_operator(rig))
 
 
 def test_a_flipper_that_sinks_during_arming_only_delays_it(configuration: Configuration) -> None:
@@ -150,10 +150,10 @@ def test_repeated_lateness_is_reported_with_the_bad_reading(
 ) -> None:
     measured = []
 
-    def measure(opened_rig: TestRig) -> Readings:
+    def measure(opened_rig: TestRig) -> BenchReadings:
         measured.append(1)
         opened_rig.lateness.update(*late(missed, age_s))
-        yield Reading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
+        yield BenchReading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
 
     with pytest.raises(pytest.fail.Exception, match=rf"error is 7 deg, .* check the gains\.\n.*{message}"):
         bench.check(measure)
@@ -168,10 +168,10 @@ def late(missed: int, age_s: float) -> tuple[Tick, DriveStates]:
 def test_a_bad_reading_without_lateness_is_measured_once(bench: StagedBench) -> None:
     measured = []
 
-    def measure(opened_rig: TestRig) -> Readings:
+    def measure(opened_rig: TestRig) -> BenchReadings:
         measured.append(1)
         opened_rig.lateness.update(*late(0, 0.9 * LATE_S))
-        yield Reading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
+        yield BenchReading("error", 7.0, "deg", 0.0, 6.0, "check the gains")
 
     with pytest.raises(pytest.fail.Exception, match=r"check the gains\.$"):
         bench.check(measure)
@@ -196,6 +196,6 @@ def test_a_robot_in_mud_must_go_onto_blocks(patient: Configuration, monkeypatch:
     """Its strides would not be in air, and the mud would need more torque than the limit."""
     monkeypatch.setattr("experiments.bench.rig.on_blocks", lambda configuration: World(track_of(["48.5"])))
     rig = SimulatedRig(patient)
-    reported = by_name(check_rest_pose(TestRig(rig, SimulatedBenchOperator(rig))))
+    reported = by_name(check_rest_pose(TestRig(rig, simulated_operator(rig))))
     lying = reported["left flipper: edge above the axis, at rest"]
     assert not lying.good and "put the robot on blocks" in lying.message

@@ -14,7 +14,7 @@ import pytest
 
 from control.records import JOINTS
 from experiments.bench.operator import BenchOperator
-from experiments.bench.reading import Reading
+from experiments.bench.reading import BenchReading
 from experiments.bench.rig import HardwareRig, on_channels
 from experiments.bench.sign_check import check_nudge
 from experiments.bench.test_rig import TestRig
@@ -74,7 +74,7 @@ def opened_rig(local_robot: Configuration) -> Iterator[TestRig]:
     rig.close()
 
 
-def bad(readings: Iterable[Reading]) -> list[str]:
+def bad(readings: Iterable[BenchReading]) -> list[str]:
     return [reading.message for reading in readings if not reading.good]
 
 
@@ -119,7 +119,7 @@ def test_channels_by_name_replace_those_of_the_configuration(configuration: Conf
 
 def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configuration) -> None:
     drive = configuration.drive | {"right_sweep": replace(configuration.drive["right_sweep"], node_id=0)}
-    with pytest.raises(BenchError, match="2 drives have the node id 0 on can0"):
+    with pytest.raises(BenchError, match=r"right_sweep.node_id = 0: .* on can0: give each bus"):
         on_channels(replace(configuration, drive=drive), ["can0"])
 
 

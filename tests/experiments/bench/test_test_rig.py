@@ -9,10 +9,11 @@ from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from experiments.bench.joint_zero_check import check_level_pose, check_turning
-from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
-from experiments.bench.reading import Reading
+from experiments.bench.operator import BenchOperator
+from experiments.bench.reading import BenchReading
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import check_nudge, check_shown_motion
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.stroke_tracking import lag_ticks
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
@@ -31,7 +32,7 @@ def rig(configuration: Configuration) -> SimulatedRig:
 
 @pytest.fixture
 def bench(rig: SimulatedRig) -> StagedBench:
-    return StagedBench(TestRig(rig, SimulatedBenchOperator(rig)), BenchReport())
+    return StagedBench(TestRig(rig, simulated_operator(rig)), BenchReport())
 
 
 def energised(rig: SimulatedRig) -> set[bool]:
@@ -59,7 +60,7 @@ def test_a_fault_ends_a_measurement_with_its_message(bench: StagedBench, rig: Si
         bench.test_rig.run_for(1.0)
 
 
-class Asked(PromptedBenchOperator):
+class Asked(BenchOperator):
     """Use an operator with the same answer to every fault."""
 
     def __init__(self, answer: str) -> None:
@@ -126,7 +127,7 @@ def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: Simul
     drive, report = rig.robot.drives[index], BenchReport()
     measure = drive.measure
     drive.measure = lambda angle_rad, velocity_rad_s: measure(-angle_rad, -velocity_rad_s)  # type: ignore[method-assign]
-    opened_rig = TestRig(rig, SimulatedBenchOperator(rig))
+    opened_rig = TestRig(rig, simulated_operator(rig))
     before = rig.robot.plant.angles_rad
     farthest_rad = 0.0
     for joint in JOINTS:
@@ -147,7 +148,10 @@ def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: Simul
 
 def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -> None:
     bench.report.begin(1, "test")
-    good, bad = Reading("speed", 1.0, "m/s", 0.0, 2.0), Reading("load", 90.0, "%", 0.0, 80.0, "take strangers off")
+    good, bad = (
+        BenchReading("speed", 1.0, "m/s", 0.0, 2.0),
+        BenchReading("load", 90.0, "%", 0.0, 80.0, "take strangers off"),
+    )
     with pytest.raises(pytest.fail.Exception) as failure:
         bench.check(lambda opened_rig: iter([good, bad]))
     assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."

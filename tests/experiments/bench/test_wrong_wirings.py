@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
-from typing import Any, NamedTuple
+from itertools import dropwhile
+from typing import Any
 
 import pytest
 
@@ -19,8 +20,8 @@ from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
-from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
+from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
@@ -37,21 +38,16 @@ def claims() -> Iterator[tuple[str, Callable[[StagedBench], None]]]:
     """Yield the tests of all stages in pytest's order: the name of the stage, and what to call."""
     for name, module in zip(STAGES, MODULES, strict=True):
         for title, test in vars(module).items():
-            if not title.startswith("test_"):
-                continue
-            if "joint" in inspect.signature(test).parameters:
-                for joint in JOINTS:
-                    yield name, partial(test, joint=joint)
-            else:
-                yield name, test
+            if title.startswith("test_"):
+                of_joints = [{"joint": joint} for joint in JOINTS]
+                arguments = of_joints if "joint" in inspect.signature(test).parameters else [{}]
+                yield from ((name, partial(test, **each)) for each in arguments)
 
 
 def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
     """Return the first stage that fails, and its message; `begin` is the first stage to run."""
-    bench = StagedBench(TestRig(rig, SimulatedBenchOperator(rig)), BenchReport())
-    for name, claim in claims():
-        if STAGES.index(name) < STAGES.index(begin):
-            continue
+    bench = StagedBench(TestRig(rig, simulated_operator(rig)), BenchReport())
+    for name, claim in dropwhile(lambda each: each[0] != begin, claims()):
         try:
             claim(bench)
         except (pytest.fail.Exception, BenchError) as complaint:
@@ -60,22 +56,11 @@ def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
     return "", ""
 
 
-def built(configuration: Configuration, **drives: dict[str, Any]) -> Configuration:
-    """Return the configuration with changes of some drives."""
-    changed = {joint: replace(configuration.drive[joint], **changes) for joint, changes in drives.items()}
-    return replace(configuration, drive=configuration.drive | changed)
-
-
-def swapped(configuration: Configuration, one: str, other: str) -> SimulatedRig:
+def swapped_joints(configuration: Configuration) -> SimulatedRig:
     """Return a rig with two motors exchanged."""
-    drive = configuration.drive | {one: configuration.drive[other], other: configuration.drive[one]}
+    sweep, adduction = (configuration.drive[f"left_{kind}"] for kind in ("sweep", "adduction"))
+    drive = configuration.drive | {"left_sweep": adduction, "left_adduction": sweep}
     return SimulatedRig(configuration, replace(configuration, drive=drive))
-
-
-def with_drive(configuration: Configuration, joint: str, **changes: float) -> SimulatedRig:
-    drives = on_blocks(configuration).drives(configuration)
-    drives[joint] = replace(drives[joint], **changes)  # type: ignore[arg-type]
-    return SimulatedRig(configuration, drives=drives)
 
 
 def babble(rig: SimulatedRig) -> None:
@@ -147,117 +132,75 @@ def stuck_encoder(configuration: Configuration) -> SimulatedRig:
     return rig
 
 
-class Wrong(NamedTuple):
-    what: str
-    rig: Callable[[Configuration], SimulatedRig]
-    stage: str
-    advice: str
-    begin: str = "wiring"  # the first stage to run; earlier stages of a slow case pass
-
-
-SILENT = {"encoder_period_s": 1e9, "current_period_s": 1e9, "heartbeat_period_s": 1e9, "slow_period_s": 1e9}
-
-WRONG = (
-    Wrong("buses", lambda c: swapped_buses(c), "wiring", "exchange the buses' channels"),
-    Wrong("missing drive", lambda c: with_drive(c, "left_adduction", **SILENT), "wiring", "check its power, wiring"),
-    Wrong("unknown sender", lambda c: SimulatedRig(c, others=[babble]), "wiring", "node 40: take it off the bus"),
-    Wrong("second program", lambda c: SimulatedRig(c, others=[command]), "wiring", "commands to node 3 from another"),
-    Wrong("rare messages", lambda c: with_drive(c, "left_sweep", current_period_s=0.01), "wiring", "message period"),
-    Wrong("watchdog off", lambda c: with_drive(c, "right_sweep", watchdog_s=0.0), "wiring", "enable_watchdog"),
-    Wrong("slow watchdog", lambda c: with_drive(c, "right_sweep", watchdog_s=0.5), "wiring", "watchdog_timeout = 0.1"),
-    Wrong("node ids", lambda c: swapped(c, "left_sweep", "left_adduction"), "signs", "exchange the node ids"),
-    Wrong(
-        "adduction's sign",
-        lambda c: SimulatedRig(c, built(c, left_adduction={"sign": 1})),
-        "signs",
-        "drive.left_adduction.sign",
-    ),
-    Wrong("stuck encoder", stuck_encoder, "signs", "left_adduction: answer to a shake is 0 rad"),
-    Wrong(
-        "encoder offset",
-        lambda c: with_drive(c, "left_adduction", encoder_offset_rad=0.15),
-        "zeros",
-        "set drive.left_adduction.zero_turn",
-        "zeros",
-    ),
-    Wrong(
-        "limits",
-        lambda c: SimulatedRig(replace(c, limits=replace(c.limits, sweep_max_deg=110.0))),
-        "zeros",
-        "narrow [limits]",
-        "zeros",
-    ),
-    Wrong(
-        "torque constant",
-        lambda c: SimulatedRig(c, built(c, right_sweep={"torque_constant_nm_a": 1.2 * 0.083})),
-        "currents",
-        "drive.right_sweep.torque_constant_nm_a",
-        "currents",
-    ),
-    Wrong(
-        "slow drive",
-        lambda c: with_drive(c, "left_sweep", current_lag_s=0.006),
-        "currents",
-        "slow current loop",
-        "currents",
-    ),
-    Wrong(
-        "repeater",
-        lambda c: SimulatedRig(c, others=[Repeater()]),
-        "watchdogs",
-        "another program that feeds it",
-        "watchdogs",
-    ),
-    Wrong(
-        "watchdog fed by any frame",
-        lambda c: with_drive(c, "right_adduction", any_frame_feeds=True),
-        "watchdogs",
-        "right_adduction: idle among requests of the position",
-        "watchdogs",
-    ),
-    Wrong("firmware 0.5 instead of 0.6", lambda _: of_firmware05(configured=False), "wiring", "left_sweep", "wiring"),
-    Wrong("firmware 0.6 instead of 0.5", lambda _: of_firmware05(built=False), "wiring", "it is 0.6.11", "wiring"),
-    Wrong(
-        "firmware 0.5, other direction",
-        lambda _: of_firmware05(encoder_direction=-1),
-        "signs",
-        "left_sweep follows other torques",
-        "signs",
-    ),
-    Wrong(
-        "firmware 0.5, other counts",
-        lambda _: of_firmware05(encoder_counts=4000),
-        "currents",
-        "encoder_counts = 8192",
-        "wiring",
-    ),
-    Wrong(
-        "soft gains",
-        lambda c: SimulatedRig(
-            replace(c, gains=replace(c.gains, sweep_stiffness_nm_rad=0.5, sweep_damping_nm_s_rad=0.01))
-        ),
-        "strokes",
-        "[gains]",
-        "strokes",
-    ),
-    Wrong(
-        "held down",
-        lambda c: SimulatedRig(c, others=[hold_down]),
-        "stops",
-        "something holds the flippers down",
-        "stops",
-    ),
-    Wrong("drive restarts", lambda c: SimulatedRig(c, others=[DriveRestart()]), "strides", "right_sweep", "strides"),
-)
-
-
 def swapped_buses(configuration: Configuration) -> SimulatedRig:
     other = {"left": "right", "right": "left"}
     drive = {joint: replace(each, bus=other[each.bus]) for joint, each in configuration.drive.items()}
     return SimulatedRig(configuration, replace(configuration, drive=drive))
 
 
-@pytest.mark.parametrize("wrong", WRONG, ids=[wrong.what for wrong in WRONG])
-def test_every_wrong_wiring_is_found_by_its_stage(configuration: Configuration, wrong: Wrong) -> None:
-    stage, message = first_complaint(wrong.rig(configuration), wrong.begin)
-    assert (stage, wrong.advice in message) == (wrong.stage, True), f"{stage}: {message}"
+SILENT = {"encoder_period_s": 1e9, "current_period_s": 1e9, "heartbeat_period_s": 1e9, "slow_period_s": 1e9}
+SOFT = {"sweep_stiffness_nm_rad": 0.5, "sweep_damping_nm_s_rad": 0.01}
+Rigs = Callable[[Configuration], SimulatedRig]
+
+
+def others(*senders: Callable[[SimulatedRig], None]) -> Rigs:
+    return lambda configuration: SimulatedRig(configuration, others=senders)
+
+
+def drive(joint: str, **changes: float) -> Rigs:
+    def make(configuration: Configuration) -> SimulatedRig:
+        drives = on_blocks(configuration).drives(configuration)
+        drives[joint] = replace(drives[joint], **changes)  # type: ignore[arg-type]
+        return SimulatedRig(configuration, drives=drives)
+
+    return make
+
+
+def joint(name: str, **changes: Any) -> Rigs:
+    return lambda c: SimulatedRig(c, replace(c, drive=c.drive | {name: replace(c.drive[name], **changes)}))
+
+
+def section(name: str, **changes: float) -> Rigs:
+    return lambda c: SimulatedRig(replace(c, **{name: replace(getattr(c, name), **changes)}))
+
+
+def firmware05(**changes: Any) -> Rigs:
+    return lambda configuration: of_firmware05(**changes)
+
+
+# what is wrong, the stage that finds it, and a part of its advice; stages before `begin` pass and are slow
+WRONG: tuple[tuple[str, Rigs, str, str, str], ...] = (
+    ("buses", swapped_buses, "wiring", "exchange the buses' channels", "wiring"),
+    ("missing drive", drive("left_adduction", **SILENT), "wiring", "check its power, wiring", "wiring"),
+    ("unknown sender", others(babble), "wiring", "node 40: take it off the bus", "wiring"),
+    ("second program", others(command), "wiring", "commands to node 3 from another", "wiring"),
+    ("rare messages", drive("left_sweep", current_period_s=0.01), "wiring", "message period", "wiring"),
+    ("watchdog off", drive("right_sweep", watchdog_s=0.0), "wiring", "enable_watchdog", "wiring"),
+    ("slow watchdog", drive("right_sweep", watchdog_s=0.5), "wiring", "watchdog_timeout = 0.1", "wiring"),
+    ("firmware 0.5 for 0.6", firmware05(configured=False), "wiring", "left_sweep", "wiring"),
+    ("firmware 0.6 for 0.5", firmware05(built=False), "wiring", "it is 0.6.11", "wiring"),
+    ("node ids", swapped_joints, "signs", "exchange the node ids", "wiring"),
+    ("adduction's sign", joint("left_adduction", sign=1), "signs", "drive.left_adduction.sign", "wiring"),
+    ("stuck encoder", stuck_encoder, "signs", "left_adduction: answer to a shake is 0 rad", "wiring"),
+    ("other direction", firmware05(encoder_direction=-1), "signs", "left_sweep follows other torques", "signs"),
+    ("offset", drive("left_adduction", encoder_offset_rad=0.15), "zeros", "drive.left_adduction.zero_turn", "zeros"),
+    ("limits", section("limits", sweep_max_deg=110.0), "zeros", "narrow [limits]", "zeros"),
+    ("other counts", firmware05(encoder_counts=4000), "currents", "encoder_counts = 8192", "wiring"),
+    ("constant", joint("right_sweep", torque_constant_nm_a=0.1), "currents", "right_sweep.torque_const", "currents"),
+    ("slow drive", drive("left_sweep", current_lag_s=0.006), "currents", "slow current loop", "currents"),
+    ("repeater", others(Repeater()), "watchdogs", "another program that feeds it", "watchdogs"),
+    ("fed", drive("right_adduction", any_frame_feeds=True), "watchdogs", "right_adduction: idle among", "watchdogs"),
+    ("soft gains", section("gains", **SOFT), "strokes", "[gains]", "strokes"),
+    ("held down", others(hold_down), "stops", "something holds the flippers down", "stops"),
+    ("drive restarts", others(DriveRestart()), "strides", "right_sweep", "strides"),
+)
+
+
+@pytest.mark.parametrize(
+    ("rigs", "stage", "advice", "begin"), [row[1:] for row in WRONG], ids=[row[0] for row in WRONG]
+)
+def test_every_wrong_wiring_is_found_by_its_stage(
+    configuration: Configuration, rigs: Rigs, stage: str, advice: str, begin: str
+) -> None:
+    found, message = first_complaint(rigs(configuration), begin)
+    assert (found, advice in message) == (stage, True), f"{found}: {message}"

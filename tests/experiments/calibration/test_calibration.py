@@ -16,11 +16,11 @@ from drivers.drive import DriveCalibration
 from experiments.actuator.configuration_change import find_target
 from experiments.actuator.file_change import changed_text
 from experiments.actuator.friction import Loop
-from experiments.actuator.plan import Plan, steps_of
+from experiments.actuator.plan import WeighingPlan, steps_of
 from experiments.actuator.report import Readings
 from experiments.actuator.simulation import BuiltRobot
-from experiments.calibration.calibration import Calibration
-from experiments.calibration.robots import SimulatedRobot, running_daemon
+from experiments.calibration.calibration import calibrate_robot
+from experiments.calibration.robots import CalibratedRobot, running_daemon
 from experiments.robot.bench_errors import EndedError
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.study.notebook import NotebookError
@@ -33,17 +33,17 @@ from tests.running_bench import Bench
 from tests.scripted_operator import ScriptedOperator
 
 JOINT = "right_adduction"
-PLAN = Plan((JOINT,), weights_g=(200.0, 400.0), trials=2, trusts_constant=False)
+PLAN = WeighingPlan((JOINT,), weights_g=(200.0, 400.0), trials=2, trusts_constant=False)
 UNCALIBRATED: dict[tuple[str, ...], Any] = {("drive", joint, "calibrated"): {} for joint in JOINTS}
 CONFIGURATION = parse_configuration(changed_text(simulated_configuration().text, UNCALIBRATED))
 TRUE_NM_A = 0.065
 LOOPS = [Loop(0.2, 0.2, quick, 0.8)._asdict() for quick in (False, False, True, True)]
 
 
-class WeighedRobot(SimulatedRobot):
+class WeighedRobot(CalibratedRobot):
     """A simulated robot whose weights are read without an error, and without the minutes that they take."""
 
-    def weigh(self, configuration: Configuration, plan: Plan) -> tuple[Readings, list[Path]]:
+    def weigh(self, configuration: Configuration, plan: WeighingPlan) -> tuple[Readings, list[Path]]:
         self.session.operator.ask("weights", {"": "done"}, lambda: None)
         entries = {
             step.key: {
@@ -78,8 +78,8 @@ class Case:
     def run(self, operator: ScriptedOperator) -> Result:
         session = Session(self.folder, operator, lambda done, total: None, simulated=True)
         built = BuiltRobot(parse_configuration(changed_text(CONFIGURATION.text, self.truth)), TRUE_NM_A)
-        calibration = Calibration(session, WeighedRobot(session, built, 1), CONFIGURATION, PLAN)
-        return calibration.run("Ada", find_target(self.folder, CONFIGURATION.text, session))
+        target = find_target(self.folder, CONFIGURATION.text, session)
+        return calibrate_robot(WeighedRobot(session, built), CONFIGURATION, PLAN, "Ada", target)
 
 
 @pytest.fixture

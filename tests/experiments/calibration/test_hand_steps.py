@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ import pytest
 from control.records import JOINTS
 from experiments.actuator.file_change import changed_text
 from experiments.actuator.simulation import BuiltRobot
+from experiments.bench.operator import Hand
 from experiments.calibration.hand_steps import HandSteps, hand_changes, level_key, stops_deg
-from experiments.calibration.robots import SimulatedRobot
+from experiments.calibration.robots import CalibratedRobot
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.robot.steps import conduct_steps
@@ -41,10 +42,10 @@ def move_by_hand(
     """Return the notebook's entries of a robot whose truth differs from its configuration."""
     operator = operator or ScriptedOperator()
     session = Session(folder, operator, lambda done, total: None, simulated=True)
-    robot = SimulatedRobot(session, BuiltRobot(with_changes(configuration, truth)), seed=1)
+    robot = CalibratedRobot(session, BuiltRobot(with_changes(configuration, truth)))
     notebook = Notebook(folder, {})
-    with robot.open(configuration) as (test_rig, hand):
-        steps = HandSteps(test_rig, operator, hand).steps(joints or JOINTS)
+    with robot.open(configuration) as test_rig:
+        steps = HandSteps(test_rig, operator).steps(joints or JOINTS)
         conduct_steps(steps, notebook, operator, session.show, {})
     return notebook.entries
 
@@ -85,23 +86,12 @@ class HastyOperator(ScriptedOperator):
         return super().ask(question, answers, lambda: None)
 
 
-class StillHand:
-    """The hand of an operator who does nothing."""
-
-    is_turning = False
-
-    def hold(self, angles_rad: Sequence[float]) -> None: ...
-
-    def turn(self, index: int, angle_rad: float) -> None: ...
-
-    def release(self) -> None: ...
-
-
 def test_an_operator_who_turns_nothing_is_asked_again_and_then_refused(tmp_path: Path) -> None:
     operator = HastyOperator()
     session = Session(tmp_path, operator, lambda done, total: None, simulated=True)
-    with SimulatedRobot(session, BuiltRobot(CONFIGURATION), seed=1).open(CONFIGURATION) as (test_rig, _):
-        steps = HandSteps(test_rig, operator, StillHand()).steps(["left_sweep"])
+    with CalibratedRobot(session, BuiltRobot(CONFIGURATION)).open(CONFIGURATION) as test_rig:
+        test_rig.operator.hand = Hand()  # does nothing
+        steps = HandSteps(test_rig, operator).steps(["left_sweep"])
         with pytest.raises(BenchError, match="left_sweep turned by 0 degrees|turned instead of left_sweep"):
             conduct_steps(steps, Notebook(tmp_path, {}), operator, session.show, {})
     assert len(operator.reported) == 2

@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.strokes import SHEAR, Recorded, StagePositions
+from experiments.loadcell.strokes import SHEAR, Recorded, StagePositions, StageSettings
 from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 
@@ -97,4 +97,4 @@ def _start(stage: PlateStage, plate: CarriedPlate, kind: str, start_s: float, sp
 def _heard(stage: PlateStage, kind: str, seed: int, random: Random) -> Recorded:
     times_s: Array = np.arange(1.0 / RATE_HZ, stage.ends_s + 1.0, 1.0 / RATE_HZ)
     forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, NOISE_N) for t in times_s]
-    return Recorded(f"lawful/{kind}/{seed}", "lawful", kind, times_s, np.array(forces_n), 0.0)
+    return Recorded(f"lawful/{kind}/{seed}", "lawful", kind, StageSettings(), times_s, np.array(forces_n), 0.0)

@@ -12,13 +12,15 @@ from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.loadcell.preparation import CellSettings, prepare_cell
-from experiments.loadcell.recording import CellRecorder
+from experiments.loadcell.recording import CellBench
 from experiments.loadcell.report import Results, evaluate_muds
-from experiments.loadcell.stage import SimulatedStage, Trial
+from experiments.loadcell.stage import CellTrial, SimulatedStage, TrialPlan
 from experiments.loadcell.strokes import INSERTION, StageSettings
-from experiments.loadcell.trials import TrialBench, TrialPlan, measure, measure_all
+from experiments.loadcell.trials import measure, measure_all
 from experiments.studies.loadcell import notebook_plan
 from experiments.study.notebook import Notebook
+from experiments.study.prompt import AutomaticOperator
+from experiments.study.session import Session
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench
 from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
@@ -69,33 +71,33 @@ class Laboratory:
         if encoder is not None:
             settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count)
             self.encoder = StageEncoder(settings)
-        self.recorder = CellRecorder(self.port, self.bench, operator, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, notebook_plan(SETTINGS))
-        stage_of_it = SimulatedStage(SETTINGS, self.bench, (), seed)
-        stage_of_it.plates = dict(muds)
-        self.trial_bench = TrialBench(
-            recorder=self.recorder,
-            stage=stage_of_it,
+        self.cell = CellBench(
+            session=Session(folder, operator, lambda done, total: None),
             plan=self.plan,
             notebook=self.notebook,
-            folder=folder,
-            show=lambda done, total: None,
+            port=self.port,
+            clock=self.bench,
+            encoder=self.encoder,
         )
+        silent = AutomaticOperator(lambda message: None)
+        self.cell.stage = stage_of_it = SimulatedStage(SETTINGS, silent, self.cell.drain, self.bench, (), seed)
+        stage_of_it.plates = dict(muds)
 
     def at(self, after_s: float, happen: Callable[[], None]) -> None:
         self.bench.events.append((self.bench.now_s() + after_s, happen))
 
     def measure(self, cell: CellSettings | None = None) -> None:
-        prepare_cell(self.trial_bench, cell or CellSettings())
-        measure_all(self.trial_bench)
+        prepare_cell(self.cell, cell or CellSettings())
+        measure_all(self.cell)
 
     def try_once(self, kind: str = INSERTION) -> list[str]:
         """Measure one trial and return the reported messages."""
-        trial = Trial("lawful", kind, 1)
-        self.recorder.listen(1.0)
-        self.trial_bench.stage.prepare(trial, 1)
-        self.notebook.write(trial.key, measure(self.trial_bench, trial))
+        trial = CellTrial("lawful", kind, 1)
+        self.cell.listen(1.0)
+        self.cell.stage.prepare(trial, 1)
+        self.notebook.write(trial.key, measure(self.cell, trial))
         return self.operator.reported
 
     def evaluate_muds(self) -> Results:

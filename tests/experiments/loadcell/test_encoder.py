@@ -36,8 +36,8 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
 
 
 def examine(laboratory: Laboratory) -> None:
-    laboratory.recorder.listen(2.0)
-    examine_encoder(laboratory.recorder, SETTINGS)
+    laboratory.cell.listen(2.0)
+    examine_encoder(laboratory.cell)
 
 
 def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: Make) -> None:
@@ -45,7 +45,7 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: 
     laboratory.at(4.5, counter_of(laboratory).unplug)
     laboratory.at(6.0, counter_of(laboratory).plug_in)
     assert any("encoder was unplugged or restarted" in each for each in laboratory.try_once())
-    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook, SETTINGS)
     assert recorded.positions is None and len(recorded.forces_n) > 400
     assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
     assert laboratory.encoder is not None and laboratory.encoder.line.is_there

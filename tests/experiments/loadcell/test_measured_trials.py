@@ -1,49 +1,23 @@
-"""Coefficients of a manual stage with an encoder: muds with known ones, and clay."""
+"""A manual stage with an encoder: lag, gaps, wrong encoders, and how clay follows the speed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from experiments.loadcell.analysis import COEFFICIENTS, analyse, analyse_trial, gather_trials
+from experiments.loadcell.analysis import analyse_trial
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.force_trials import wide_pace
-from experiments.loadcell.stage_track import WIDE
 from experiments.loadcell.strokes import (
     INSERTION,
     SHEAR,
-    Alignment,
-    AnalysedTrial,
     Recorded,
     StagePositions,
-    StageSettings,
 )
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
-from tests.experiments.loadcell.lawful_mud import LawfulMud, feel_by_hand
-from tests.experiments.loadcell.test_force_trials import true_of_clay
+from tests.experiments.loadcell.lawful_mud import feel_by_hand
 
-SETTINGS = StageSettings()
-KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
-BOUND = 0.03
 LAG_S = 0.012
-KINDS = [(INSERTION, 1), (INSERTION, 2), (INSERTION, 3), (SHEAR, 4)]
-
-
-def found(trials: list[Recorded]) -> dict[str, float]:
-    reported = analyse(trials, SETTINGS, lambda done, total: None)
-    assert all(trial.is_measured for trial in reported)
-    return {name: gather_trials(reported, name, 0.0).value for name in COEFFICIENTS}
-
-
-def test_coefficients_of_a_lawful_mud_are_found_within_three_per_cent_by_hand() -> None:
-    trials = [feel_by_hand(LawfulMud(**KNOWN), kind, i, lag_s=LAG_S) for kind, i in KINDS]
-    assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
-
-
-def test_those_of_clay_are_those_of_its_noise_free_curve_at_the_speed_that_was_set() -> None:
-    trials = [feel_by_hand(clay_plate(47.6), kind, 20 + i, lag_s=LAG_S) for kind, i in KINDS]
-    assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in true_of_clay(47.6).items()}
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +30,9 @@ def insertion() -> Recorded:
     return feel_by_hand(clay_plate(49.5), INSERTION, 7, lag_s=LAG_S, jitter_s=0.0)
 
 
-def one(recorded: Recorded, aligned: Alignment = WIDE) -> AnalysedTrial:
-    return analyse_trial(recorded, SETTINGS, wide_pace(SETTINGS), aligned)
-
-
 def test_the_lag_between_the_devices_is_found_from_the_stroke(insertion: Recorded) -> None:
     for lag_s in (-0.05, 0.0, 0.09):
-        reported = one(insertion._replace(times_s=insertion.times_s - LAG_S + lag_s))
+        reported = analyse_trial(insertion._replace(times_s=insertion.times_s - LAG_S + lag_s))
         assert reported.alignment is not None
         assert reported.alignment.lag_s == pytest.approx(lag_s, abs=0.002)
 
@@ -70,7 +40,9 @@ def test_the_lag_between_the_devices_is_found_from_the_stroke(insertion: Recorde
 def test_the_coefficients_do_not_depend_on_the_encoders_direction(insertion: Recorded) -> None:
     assert insertion.positions is not None
     turned = insertion._replace(positions=StagePositions(insertion.positions.times_s, -insertion.positions.positions_m))
-    assert one(turned).coefficients == {name: pytest.approx(k) for name, k in one(insertion).coefficients.items()}
+    assert analyse_trial(turned).coefficients == {
+        name: pytest.approx(k) for name, k in analyse_trial(insertion).coefficients.items()
+    }
 
 
 def places_of(recorded: Recorded) -> tuple[Array, Array]:
@@ -80,7 +52,7 @@ def places_of(recorded: Recorded) -> tuple[Array, Array]:
 
 def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
-    reported = one(insertion._replace(positions=StagePositions(times_s, 0.05 * positions_m)))
+    reported = analyse_trial(insertion._replace(positions=StagePositions(times_s, 0.05 * positions_m)))
     assert not reported.is_measured
     assert "is the encoder on the axis that moves" in reported.remark and "--position-step" in reported.remark
     assert "k_p" in reported.coefficients or reported.problem
@@ -88,16 +60,16 @@ def test_an_encoder_on_another_axis_leaves_the_trial_to_the_force(insertion: Rec
 
 def test_a_wrong_travel_per_count_is_reported(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
-    reported = one(insertion._replace(positions=StagePositions(times_s, 2.0 * positions_m)))
+    reported = analyse_trial(insertion._replace(positions=StagePositions(times_s, 2.0 * positions_m)))
     assert "6.0 cm deep by the encoder, and 3 cm was set" in reported.remark
 
 
 def test_a_gap_in_the_positions_costs_its_own_samples_only(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
-    whole = one(insertion)
+    whole = analyse_trial(insertion)
     middle_s = times_s[int(np.argmin(np.abs(positions_m + 0.035)))]  # 1.5 cm deep
     kept = np.abs(times_s - middle_s) > 0.04
-    reported = one(insertion._replace(positions=StagePositions(times_s[kept], positions_m[kept])))
+    reported = analyse_trial(insertion._replace(positions=StagePositions(times_s[kept], positions_m[kept])))
     assert reported.is_measured
     assert reported.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
 
@@ -105,6 +77,6 @@ def test_a_gap_in_the_positions_costs_its_own_samples_only(insertion: Recorded) 
 def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> None:
     """r = c 0.1^0.4 / (1 + c 0.1^0.4) within 0.05, because the mud yields gradually over a millimetre."""
     true = RATE_COEFFICIENT * 0.1**0.4 / (1.0 + RATE_COEFFICIENT * 0.1**0.4)
-    reported = one(drag)
+    reported = analyse_trial(drag)
     assert reported.alignment is not None and np.isnan(reported.alignment.lag_s)
     assert reported.alignment.rate_fraction == pytest.approx(true, abs=0.05)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, load_counted
-from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
+from experiments.loadcell.stage import CellTrial, Stage
 from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
 from experiments.loadcell.trials import list_problems, record
 from experiments.robot.bench_errors import BenchError
@@ -27,14 +26,14 @@ def make(tmp_path: Path) -> Iterator[Make]:
         yield build
 
 
-class Idle(SimulatedStage):
+class Idle(Stage):
     """A stage that does not move."""
 
     patience_s = 0.5
 
     def lower(self) -> None: ...
 
-    def start(self, trial: Trial) -> None: ...
+    def start(self, trial: CellTrial) -> None: ...
 
     def lift(self) -> None: ...
 
@@ -42,9 +41,10 @@ class Idle(SimulatedStage):
 def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) -> None:
     smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
     for laboratory in (smeared, sharp):
-        bench = replace(laboratory.trial_bench, stage=Idle(SETTINGS, laboratory.bench, (), 1))
+        bench = laboratory.cell
+        bench.stage = Idle(SETTINGS, laboratory.operator, bench.drain)
         for number in (1, 2):
-            record(bench, Trial("lawful", INSERTION, number), 1)
+            record(bench, CellTrial("lawful", INSERTION, number), 1)
     assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"lawful/insertion/1: {AVERAGED}"]
     assert sharp.operator.reported == []
 
@@ -59,7 +59,7 @@ def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: 
     assert any("unplugged during the trial" in each for each in reported)
     assert laboratory.notebook.entries["lawful/insertion/1"]["file"].endswith("_2.csv")
     assert len(list((laboratory.folder / RAW).iterdir())) == 2
-    assert len(load_counted(laboratory.folder, laboratory.notebook)) == 1
+    assert len(load_counted(laboratory.folder, laboratory.notebook, SETTINGS)) == 1
 
 
 @pytest.mark.parametrize(
@@ -80,26 +80,26 @@ def test_an_invalid_trial_is_reported_and_left_out(
     (entry,) = laboratory.notebook.entries.values()
     assert entry["skipped"] and any(message in each for each in entry["why"])
     assert (laboratory.folder / entry["file"]).exists()
-    assert load_counted(laboratory.folder, laboratory.notebook) == []
+    assert load_counted(laboratory.folder, laboratory.notebook, SETTINGS) == []
 
 
 def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
     laboratory = make()
     laboratory.try_once()
-    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook, SETTINGS)
     clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
-    stretch = laboratory.recorder.record(0.01, 0.1, 0.1)
+    stretch = laboratory.cell.record(0.01, 0.1, 0.1)
     assert any("at its limit" in each for each in list_problems(AnalysedTrial(clipped), stretch, 0.0))
     assert list_problems(AnalysedTrial(recorded), stretch, 0.0) == []
 
 
 def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
     laboratory = make(trials=2)
-    stage, asked = laboratory.trial_bench.stage, list[str]()
+    stage, asked = laboratory.cell.stage, list[str]()
     answers = [GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON]
     prepare = stage.prepare
 
-    def answer(trial: Trial, trials: int) -> str:
+    def answer(trial: CellTrial, trials: int) -> str:
         asked.append(trial.key)
         prepare(trial, trials)
         return answers.pop(0)
@@ -112,13 +112,13 @@ def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> No
 
 
 def test_the_lines_are_examined_first(make: Make) -> None:
-    assert examine_lines(make().recorder, "auto") == "number"
+    assert examine_lines(make().cell, "auto") == "number"
     indicator = make(amplifier=AmplifierParameters(style="indicator"))
-    assert examine_lines(indicator.recorder, "auto") == "indicator"
+    assert examine_lines(indicator.cell, "auto") == "indicator"
     with pytest.raises(BenchError, match="--format indicator"):
-        examine_lines(indicator.recorder, "number")
+        examine_lines(indicator.cell, "number")
     with pytest.raises(BenchError, match="--format column1"):
-        examine_lines(make(amplifier=AmplifierParameters(style="columns")).recorder, "auto")
+        examine_lines(make(amplifier=AmplifierParameters(style="columns")).cell, "auto")
 
 
 @pytest.mark.parametrize(
@@ -142,20 +142,19 @@ def test_a_cell_that_cannot_be_read_is_refused(
 
 def test_a_cell_that_stays_unplugged_ends_the_recording(make: Make) -> None:
     laboratory = make()
-    laboratory.recorder.listen(0.5)
+    laboratory.cell.listen(0.5)
     laboratory.bench.amplifier.unplug()
     with pytest.raises(BenchError, match="did not come back"):
-        laboratory.recorder.tare()
+        laboratory.cell.tare()
 
 
-def test_the_manual_stage_prompts_for_every_step(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    recorder, drained = make(operator=ScriptedOperator(GO_ON, SKIP)).recorder, list[int]()
-    monkeypatch.setattr(recorder, "drain", lambda: drained.append(1))
-    stage = ManualStage(SETTINGS, recorder)
+def test_the_stage_prompts_for_every_step_and_attends_the_ports_meanwhile() -> None:
+    drained = list[int]()
+    stage = Stage(SETTINGS, ScriptedOperator(GO_ON, SKIP), lambda: drained.append(1))
     assert stage.weigh(0) == 0.0
-    assert stage.prepare(Trial("a", SHEAR, 1), 5) == GO_ON
-    assert stage.prepare(Trial("a", INSERTION, 1), 5) == SKIP
+    assert stage.prepare(CellTrial("a", SHEAR, 1), 5) == GO_ON
+    assert stage.prepare(CellTrial("a", INSERTION, 1), 5) == SKIP
     stage.lower()
     stage.lift()
-    stage.start(Trial("a", INSERTION, 1))
+    stage.start(CellTrial("a", INSERTION, 1))
     assert len(drained) == 4

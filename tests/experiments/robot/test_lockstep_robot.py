@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,20 +26,25 @@ from experiments.robot.bench_robot import (
     walk,
 )
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import read_log
 from operator_client.status_client import CallRefusedError
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.scripted_operator import ScriptedOperator
+
+
+def make_robot(folder: Path, configuration: Configuration) -> LockstepRobot:
+    recorder, failures = FileRecorder(folder / "log.mcap", configuration), Failures(configuration.bus)
+    track = Track([(5.0, MUDS["48.5"])])
+    return LockstepRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
 
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
-    configuration = simulated_configuration()
-    recorder = FileRecorder(tmp_path / "log.mcap", configuration)
-    track, failures = Track([(5.0, MUDS["48.5"])]), Failures(configuration.bus)
-    made = LockstepRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
+    made = make_robot(tmp_path, simulated_configuration())
     try:
         yield made
     finally:
@@ -90,14 +95,11 @@ def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRob
 
 
 def test_a_fault_that_asks_for_a_still_pose_ends_a_move(tmp_path: Path) -> None:
-    configuration = replace(simulated_configuration(), faults=FaultBounds())
-    recorder, failures = FileRecorder(tmp_path / "log.mcap", configuration), Failures(configuration.bus)
-    lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder, failures=failures)
-    robot = LockstepRobot(lockstep, recorder)
+    robot = make_robot(tmp_path, replace(simulated_configuration(), faults=FaultBounds()))
     arm(robot)
     robot.call("move", right_sweep_rad=0.6)
     robot.wait(0.1)
-    lockstep.fail("left_sweep.current", "off", 0.1)
+    robot.lockstep.fail("left_sweep.current", "off", 0.1)
     robot.wait(0.016)
     status = robot.call("status")
     assert not status["moving"] and status["mode"] == "hold"
@@ -123,25 +125,6 @@ def test_a_fault_that_ends_a_walk_is_reported_with_its_message(
         walk(robot, 0.03, 1)
 
 
-class Decided:
-    """An Operator who gives the same answer to every fault."""
-
-    def __init__(self, answer: str) -> None:
-        self.answer = answer
-        self.asked: list[str] = []
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # AutomaticOperator takes the first
-        self.asked.append(question)
-        meanwhile()
-        return self.answer
-
-    def ask_number(self, question: str, low: float, high: float, meanwhile: Callable[[], None]) -> float:
-        raise AssertionError("no number is wanted")
-
-    def report(self, message: str) -> None: ...
-
-
 @pytest.fixture
 def faulty(robot: LockstepRobot) -> LockstepRobot:
     """Return a robot in FAULT: a drive was restarted under torque some seconds ago."""
@@ -153,8 +136,9 @@ def faulty(robot: LockstepRobot) -> LockstepRobot:
 
 
 def test_a_fault_is_cleared_where_the_operator_agrees(faulty: LockstepRobot) -> None:
-    operator = Decided(CLEAR)
+    operator = ScriptedOperator(CLEAR)
     arm(faulty, operator)
+    assert list(operator.offered[0]) == [CLEAR, LEAVE]  # an automatic operator takes the first
     assert faulty.call("status")["mode"] == "hold"
     (question,) = operator.asked
     assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
@@ -162,7 +146,7 @@ def test_a_fault_is_cleared_where_the_operator_agrees(faulty: LockstepRobot) -> 
 
 def test_a_fault_that_the_operator_leaves_ends_the_experiment(faulty: LockstepRobot) -> None:
     with pytest.raises(EndedError, match="the fault remains; remove its cause, then 'mudskipper clear'"):
-        arm(faulty, Decided(LEAVE))
+        arm(faulty, ScriptedOperator(LEAVE))
     assert faulty.call("status")["mode"] == "fault"
 
 
@@ -171,7 +155,7 @@ def test_a_transient_fault_makes_no_prompt(robot: LockstepRobot) -> None:
     robot.lockstep.fail("left_sweep.position", "off", 2.0)
     robot.wait(1.9)
     assert any(fault["blocks_arming"] for fault in robot.call("status")["faults"])
-    operator = Decided(LEAVE)
+    operator = ScriptedOperator(LEAVE)
     arm(robot, operator)
     assert operator.asked == [] and robot.call("status")["mode"] == "hold"
 

@@ -12,7 +12,6 @@ from statistics import fmean, stdev
 import pytest
 
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
-from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate, execute
 
 
 class Listener:
@@ -63,18 +62,3 @@ def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_pat
     listener.amplifier.plug_in()
     assert (tmp_path / "cell").exists()
     listener.close()
-
-
-def test_an_operator_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:
-    bench = EmulatedBench(clay_plate(49.5), tmp_path / "cell")
-    bench.amplifier.waits_for_delivery = False
-    assert "insert" in execute(bench, ["jump"])
-    assert execute(bench, ["lower"]) == "lower at 0.0 s"
-    bench.pass_time(1.0)
-    assert bench.stage.plate.depth_m == pytest.approx(0.03)
-    execute(bench, ["lift"])
-    bench.pass_time(1.0)
-    assert bench.stage.plate.depth_m < 0.0
-    execute(bench, ["hang", "100"])
-    assert bench.stage.hung_weight_n == pytest.approx(0.980665)
-    bench.close()

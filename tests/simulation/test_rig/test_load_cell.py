@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from simulation.mud.clay import MUDS, rate_factor
+from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, FlipperContact, attitude_of
 from simulation.mud.layer import Layer
-from simulation.test_rig.load_cell import LoadCell, measure_insertion, measure_shear
+from simulation.test_rig.joint_cell import measure_stroke
+from simulation.test_rig.load_cell import STEP_S, LoadCell, measure_shear
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]
@@ -21,6 +22,14 @@ GIRTH_M = 2.0 * (GEOMETRY.plate_width_m + GEOMETRY.plate_thickness_m)
 
 def lowered_rad(sweep_rad: float, depth_m: float = 0.03) -> float:
     return GEOMETRY.adduction_rad(sweep_rad, depth_m)
+
+
+def strokes(
+    depth_m: float, speed_m_s: float, sweep_rad: float = 0.0, adduction_rad: float = 0.0, clay: Clay = CLAY
+) -> list[np.ndarray]:
+    """Return depths, volumes and forces down and up."""
+    cell = LoadCell(clay, GEOMETRY, sweep_rad, adduction_rad)
+    return [np.array(curve).T for curve in measure_stroke(cell, depth_m, speed_m_s)]
 
 
 @given(st.floats(-0.6, 0.6), st.floats(-1.0, 0.0))
@@ -35,40 +44,36 @@ def test_the_axes_are_those_of_the_flipper_s_plate(sweep_rad: float, adduction_r
 
 @pytest.mark.parametrize("speed_m_s", [0.03, 0.1, 0.4])
 def test_an_upright_plate_meets_bearing_suction_and_adhesion_by_its_speed(speed_m_s: float) -> None:
-    down, held, up = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.04, speed_m_s)
-    strength_pa, (z, force_n), (z_up, force_up_n) = (
-        rate_factor(speed_m_s) * CLAY.strength_pa,
-        *map(np.array, (down, up)),
-    )
+    (z, _, force_n), (z_up, _, force_up_n) = strokes(0.04, speed_m_s)
+    strength_pa = rate_factor(speed_m_s) * CLAY.strength_pa
     limits_n = strength_pa * (5.14 * EDGE_M2 + 0.25 * GIRTH_M * z)
     assert force_n[z > 0.01] == pytest.approx(limits_n[z > 0.01], rel=0.03)  # the last millimetre has not yielded yet
     limits_n = strength_pa * (9.0 * EDGE_M2 * np.minimum(z_up / 0.01, 1.0) + 0.25 * GIRTH_M * z_up)
     yielded = (z_up > 0.002) & (z_up < 0.035)
     assert force_up_n[yielded] == pytest.approx(-limits_n[yielded], rel=0.001)
-    assert held.depths_m == ()
 
 
 @pytest.mark.parametrize("sweep_rad", [0.0, 0.5, -0.5])
 def test_it_goes_from_the_surface_down_to_the_depth_and_up_until_it_is_out(sweep_rad: float) -> None:
     """A plate that leans is inserted harder than an upright one, alike to the front and to the back."""
-    down, _, up = measure_insertion(CLAY, GEOMETRY, sweep_rad, lowered_rad(sweep_rad), 0.03, 0.1)
-    steps_m = np.diff(down.depths_m)
-    assert min(steps_m) > 0.0 > max(np.diff(up.depths_m))
-    assert (down.depths_m[-1], steps_m[0]) == pytest.approx((0.03, 0.1 * 0.0005), rel=0.01)
-    assert down.forces_n[0] < 0.1 * down.forces_n[-1]
-    assert up.forces_n[-1] == pytest.approx(0.0, abs=1e-3)
-    upright_n = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down.forces_n[-1]
-    mirrored = measure_insertion(CLAY, GEOMETRY, -sweep_rad, lowered_rad(sweep_rad), 0.03, 0.1)
-    assert down.forces_n == pytest.approx(mirrored.down.forces_n)
-    assert down.forces_n[-1] > 1.2 * upright_n or not sweep_rad
+    (z, _, force_n), (z_up, _, force_up_n) = strokes(0.03, 0.1, sweep_rad, lowered_rad(sweep_rad))
+    steps_m = np.diff(z)
+    assert min(steps_m) > 0.0 > max(np.diff(z_up))
+    assert (z[-1], steps_m[0]) == pytest.approx((0.03, 0.1 * 0.0005), rel=0.01)
+    assert force_n[0] < 0.1 * force_n[-1]
+    assert force_up_n[-1] == pytest.approx(0.0, abs=1e-3)
+    (_, _, upright_n), _ = strokes(0.03, 0.1)
+    (_, _, mirrored_n), _ = strokes(0.03, 0.1, -sweep_rad, lowered_rad(sweep_rad))
+    assert force_n == pytest.approx(mirrored_n)
+    assert force_n[-1] > 1.2 * upright_n[-1] or not sweep_rad
 
 
 def test_a_hold_of_half_a_second_loses_the_stated_fraction() -> None:
     for relaxation, fractions in ((0.13, (0.88, 0.87)), (0.0, (1.0, 1.0))):
-        held = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1, relaxation=relaxation, hold_s=3.0).held
-        assert len(held.forces_n) == 6000 and len(set(held.depths_m)) == 1
-        lost = (held.forces_n[1000] / held.forces_n[0], held.forces_n[-1] / held.forces_n[0])
-        assert lost == pytest.approx(fractions, abs=0.005)
+        cell = LoadCell(CLAY, GEOMETRY, 0.0, 0.0, relaxation)
+        cell.lower(0.03, 0.1)
+        held_n = [cell.step(STEP_S, 0.0, 0.0)[1] for _ in range(round(3.0 / STEP_S))]
+        assert (held_n[1000] / held_n[0], held_n[-1] / held_n[0]) == pytest.approx(fractions, abs=0.005)
 
 
 @pytest.mark.parametrize("sweep_rad", [0.0, 0.4, -0.4])
@@ -89,9 +94,7 @@ def test_a_load_cell_finds_a_crust_where_it_is() -> None:
     A strip that has just come into the mud is loaded within its first millimetre or two: up to 5 % are missing.
     """
     crust = CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),))
-    (z, plain_n), (_, crusted_n) = (
-        np.array(measure_insertion(clay, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down) for clay in (CLAY, crust)
-    )
+    ((z, _, plain_n), _), ((_, _, crusted_n), _) = (strokes(0.03, 0.1, clay=clay) for clay in (CLAY, crust))
     sides_n = 2.0 * CLAY.strength_pa * 0.25 * GIRTH_M * np.clip(z, 0.0, 0.01)
     inside, below = (z > 0.002) & (z < 0.0099), z > 0.0102
     edge_n = 2.0 * CLAY.strength_pa * 5.14 * EDGE_M2

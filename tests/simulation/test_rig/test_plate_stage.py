@@ -59,14 +59,14 @@ def test_an_insertion_lowers_holds_and_lifts() -> None:
 
 
 def test_the_cell_reads_the_mean_since_the_last_reading_and_a_hanging_weight() -> None:
-    stage = PlateStage(Air(), StageParameters(1e6, cell_sign=-1.0))
+    stage = PlateStage(Air(), StageParameters(1e6))
     stage.reset()
     stage.mean_force_n(0.0)
     stage.hung_weight_n = 2.0
-    assert stage.mean_force_n(0.5) == pytest.approx(-2.0 + LIFTED_M)
+    assert stage.mean_force_n(0.5) == pytest.approx(2.0 - LIFTED_M)
     stage.hung_weight_n = 0.0
     stage.insert(0.5, 0.0, 0.1, 0.0)  # 2 cm down within 0.2 s
-    assert stage.mean_force_n(0.7) == pytest.approx(LIFTED_M / 2.0, rel=0.01)
+    assert stage.mean_force_n(0.7) == pytest.approx(-LIFTED_M / 2.0, rel=0.01)
 
 
 @given(st.floats(0.003, 0.3), st.integers(0, 10**6))

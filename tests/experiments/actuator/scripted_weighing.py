@@ -1,4 +1,4 @@
-"""A calibration with scripted robot, joint, weights and operator, for tests."""
+"""A weighing with scripted robot, joint, weights and operator, for tests."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from control.records import JOINTS
-from experiments.actuator.calibration import Calibration
 from experiments.actuator.friction import Loop
-from experiments.actuator.plan import Plan, Step
+from experiments.actuator.plan import WeighingPlan, WeighingStep
 from experiments.actuator.simulation import bench_configuration
+from experiments.actuator.weighing import JointWeighing, WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Entry, Notebook
 from experiments.study.prompt import GO_ON
@@ -20,7 +20,7 @@ from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 
 JOINT = "right_adduction"
-PLAN = Plan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
+PLAN = WeighingPlan((JOINT,), weights_g=(100.0, 200.0, 400.0), trials=2)
 TRUE_NM_A = 0.0719
 
 
@@ -49,22 +49,24 @@ class ScriptedRobot(StillRobot):
         self.winding_c = max(30.0, self.winding_c - duration_s)
 
 
-class ScriptedWeights:
-    """A WeightHandler that hangs the requested weight, unless the script of the step says otherwise."""
+class ScriptedWeights(WeightHandler):
+    """Hangs the requested weight, unless the script of the step says otherwise."""
 
     handling_s = 2.0
 
-    def __init__(self, robot: ScriptedRobot, script: Mapping[str, list[Callable[[], str]]]) -> None:
-        self.robot, self.script = robot, {key: list(answers) for key, answers in script.items()}
+    def __init__(self, robot: ScriptedRobot, operator: ScriptedOperator) -> None:
+        super().__init__(operator, PLAN, JOINT)
+        self.robot = robot
+        self.script: dict[str, list[Callable[[], str]]] = {}
         self.asked: list[str] = []
 
-    def hold_level(self, joint: str, meanwhile: Callable[[], None]) -> None:
+    def hold_level(self, meanwhile: Callable[[], None]) -> None:
         self.robot.hanging_g = 0.0
 
     def release(self, meanwhile: Callable[[], None]) -> None:
         meanwhile()
 
-    def hang(self, step: Step, meanwhile: Callable[[], None]) -> str:
+    def hang(self, step: WeighingStep, meanwhile: Callable[[], None]) -> str:
         self.meanwhile = meanwhile
         meanwhile()
         self.asked.append(step.key)
@@ -99,16 +101,14 @@ class Case:
         self.folder = folder
         self.robot = ScriptedRobot()
         self.operator = ScriptedOperator()
-        self.hand = ScriptedWeights(self.robot, {})
+        self.hand = ScriptedWeights(self.robot, self.operator)
         self.shown: list[tuple[int, int]] = []
 
     def run(self) -> Mapping[str, Any]:
         notebook = Notebook(self.folder, asdict(PLAN))
-        return Calibration(
-            self.robot, JOINT, PLAN, self.hand, self.operator, notebook, lambda *at: self.shown.append(at)
-        ).run()
+        return JointWeighing(self.robot, self.hand, notebook, lambda *at: self.shown.append(at)).run()
 
-    def on(self, step: Step, *answers: Callable[[], str]) -> None:
+    def on(self, step: WeighingStep, *answers: Callable[[], str]) -> None:
         self.hand.script[step.key] = list(answers)
 
     def hanging(self, grams: float) -> Callable[[], str]:
