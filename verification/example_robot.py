@@ -22,9 +22,9 @@ def load_example(drive: str = DEFAULT) -> Configuration:
     return parse_configuration(calibrated(with_drive_type(EXAMPLE.read_text(encoding="utf-8"), drive)), EXAMPLE)
 
 
-def load_one_flipper(drive: str = DEFAULT) -> Configuration:
+def load_one_flipper() -> Configuration:
     """The right flipper of the example: two motors on one bus."""
-    example, rig = load_example(drive), Rig(("right",))
+    example, rig = load_example(), Rig(("right",))
     drives = {joint: example.drive[joint] for joint in rig.joints}
     buses = {drive.bus: example.bus[drive.bus] for drive in drives.values()}
     return replace(example, rig=rig, drive=drives, bus=buses, friction={})

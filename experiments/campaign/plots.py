@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
+from experiments.reports.mud_styles import name_decades
 from experiments.reports.style import FAINT, FORWARD
 
 COLUMNS = 3  # of panels
@@ -51,9 +51,7 @@ def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> Non
         panel.set_xlim(-0.5, len(names) - 0.5)
     elif x.min() > 0.0 and x.max() >= DECADE * x.min():
         panel.set_xscale("log")
-        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        panel.xaxis.set_major_formatter("{x:g}")
-        panel.xaxis.set_minor_formatter("")
+        name_decades(panel.xaxis)
     panel.set_xlabel(key, fontsize="small")
 
 

@@ -43,16 +43,11 @@ def agreements(pairs: DataFrame) -> dict[str, dict[str, Any]]:
 
     The root mean square and the largest show the tails that a median hides.
     """
-    sizes = {name: pairs.loc[pairs["coefficient"] == name, "difference"].abs() for name in COEFFICIENTS}
-    sizes[ALL] = pairs["difference"].abs()
+    sizes = pairs["difference"].abs()
+    by_name = {name: sizes[pairs["coefficient"] == name] for name in COEFFICIENTS} | {ALL: sizes}
     return {
-        name: {
-            "median": _rounded(each.median()),
-            "rms": _rounded(float(np.sqrt((each**2).mean()))),
-            "largest": _rounded(each.max()),
-            "n": len(each),
-        }
-        for name, each in sizes.items()
+        name: _rounded(median=own.median(), rms=float(np.sqrt((own**2).mean())), largest=own.max()) | {"n": len(own)}
+        for name, own in by_name.items()
     }
 
 
@@ -101,28 +96,19 @@ def _same_strides(values: DataFrame, estimates: DataFrame, disturbance: str, see
 
 
 def sensitivity(changes: DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the effect of each disturbance, by coefficient."""
-    return {
-        disturbance: {
-            name: _moves(own["moved_errors"]) if disturbance == MISSING else _ratios(own["ratio"])
-            for name in COEFFICIENTS
-            for own in (changes[(changes["disturbance"] == disturbance) & (changes["coefficient"] == name)],)
-        }
-        for disturbance in dict(DISTURBED)
-    }
+    """Return the effect of each disturbance, by coefficient: the ratios, or what moved by more than MOVED errors."""
+    return {run: {name: _effect_of(changes, run, name) for name in COEFFICIENTS} for run in dict(DISTURBED)}
 
 
-def _ratios(ratios: "pandas.Series[float]") -> dict[str, Any]:
-    range_of = {"median": ratios.median(), "smallest": ratios.min(), "largest": ratios.max()}
-    rounded = {name: _rounded(value) for name, value in range_of.items()}
-    return rounded | {"n": int(ratios.count()), "lost": int(ratios.isna().sum())}
+def _effect_of(changes: DataFrame, run: str, coefficient: str) -> dict[str, Any]:
+    own = changes[(changes["disturbance"] == run) & (changes["coefficient"] == coefficient)]
+    known = own["moved_errors" if run == MISSING else "ratio"].dropna()
+    if run == MISSING:
+        found = _rounded(moved=(known > MOVED).mean())
+    else:
+        found = _rounded(median=known.median(), smallest=known.min(), largest=known.max())
+    return found | {"n": len(known), "lost": len(own) - len(known)}
 
 
-def _moves(errors: "pandas.Series[float]") -> dict[str, Any]:
-    """Return the fraction of values that moved by more than MOVED claimed errors."""
-    known = errors.dropna()
-    return {"moved": _rounded((known > MOVED).mean()), "n": len(known), "lost": len(errors) - len(known)}
-
-
-def _rounded(value: float) -> float | None:
-    return None if np.isnan(value) else round(float(value), 4)
+def _rounded(**values: float) -> dict[str, Any]:
+    return {name: None if np.isnan(value) else round(float(value), 4) for name, value in values.items()}

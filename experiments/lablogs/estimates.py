@@ -29,19 +29,10 @@ MISSING_ROWS = 0.3
 SEEDS = (1, 2, 3)  # of the random choice of missing rows: one draw can spare the few rows that matter
 RECORDED, LATE, EARLY, MISSING = "recorded", "current_late", "current_early", "rows_missing"
 DISTURBED = ((LATE, 0), (EARLY, 0), *((MISSING, seed) for seed in SEEDS))
-COLUMNS = {
-    "flipper": "object",
-    "index": "int64",
-    "t_start_s": "float64",
-    "coefficient": "object",
-    "value": "float64",
-    "std_error": "float64",
-    "repeatability": "float64",
-    "depth_m": "float64",
-    "speed_m_s": "float64",
-    "stance": "object",
-    "kind": "object",  # value, bound or invalid
-}
+OF_STRIDE = ("flipper", "index", "t_start_s", "stance")
+NUMBERS = ("value", "std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate
+COLUMNS = dict.fromkeys((*OF_STRIDE, "coefficient", *NUMBERS, "kind"), "object")  # kind: value, bound or invalid
+COLUMNS |= {"index": "int64", "t_start_s": "float64"} | dict.fromkeys(NUMBERS, "float64")
 
 
 class EvaluatedLog(NamedTuple):
@@ -78,13 +69,12 @@ def read_log(
         return Refusal(name, str(problem))
     except (ValueError, ArithmeticError, LookupError) as defect:  # of this program; the other logs are still evaluated
         return Refusal(name, f"{paths[0]}: cannot be evaluated: {type(defect).__name__}: {defect}")
-    estimates = pandas.concat(frames, ignore_index=True)
     return EvaluatedLog(
         name=name,
         flippers=recording.flippers,
         fixed_base=recording.fixed_base,
         in_mud=in_mud,
-        estimates=estimates,
+        estimates=pandas.concat(frames, ignore_index=True),
         findings=recording.findings,
         mud=recording.mud,
     )
@@ -104,19 +94,9 @@ def _runs(name: str, recording: Recording, disturbed: bool) -> Iterator[tuple[st
 def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame:
     """Return the estimates in the order of the strides, with the number of the walk that each belongs to."""
     rows = [
-        {
-            "flipper": stride.flipper,
-            "index": stride.index,
-            "t_start_s": stride.t_start_s,
-            "coefficient": name,
-            "value": estimate.value,
-            "std_error": estimate.std_error,
-            "repeatability": estimate.repeatability,
-            "depth_m": estimate.depth_m,
-            "speed_m_s": estimate.speed_m_s,
-            "stance": stride.stance,
-            "kind": _kind_of(estimate),
-        }
+        {key: getattr(stride, key) for key in OF_STRIDE}
+        | {"coefficient": name, "kind": _kind_of(estimate)}
+        | estimate._asdict()
         for stride in strides
         for name in COEFFICIENTS
         for estimate in (getattr(stride, name),)

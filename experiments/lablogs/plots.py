@@ -1,13 +1,12 @@
 """The evaluation of real logs as pictures, with one row of panels for each method."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import pi
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 from pandas import DataFrame
 
@@ -16,7 +15,7 @@ from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS
+from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS, name_decades
 
 COLOURS = dict(zip(COEFFICIENTS, ("tab:blue", "tab:red", "tab:green"), strict=True))
 PER_CM3 = 1e6  # N/m³
@@ -27,26 +26,22 @@ SMALL: dict[str, Any] = {"fontsize": "small"}
 
 def draw_strokes(estimates: DataFrame) -> Figure:
     """Draw k_s by stroke and trial, a panel for each group on a fixed base."""
-    strokes = {method: _strokes_by_group(estimates, method) for method in METHODS}
-    groups = [name for name, own in strokes[METHODS[0]].items() if len(own)]
-    figure, panels = _panels(max(len(groups), 1), sharey="row")
-    for row, method in zip(panels, METHODS, strict=True):
-        for panel, name in zip(row, groups, strict=False):
-            own = strokes[method][name]
-            _draw_trials(panel, own[own["coefficient"] == "k_s"])
-            panel.set_title(f"{name}, method {method}", **SMALL)
-            panel.set_xlabel("stroke")
-        row[0].set_ylabel("$k_s$ (N/cm³)")
-        row[0].set_ylim(bottom=0.0)
+
+    def draw(panel: Axes, strokes: Mapping[str, DataFrame], group: str) -> None:
+        own = strokes[group]
+        _draw_trials(panel, own[own["coefficient"] == "k_s"])
+
+    first = _strokes_by_group(estimates[estimates["method"] == METHODS[0]])
+    groups = {name: name for name, own in first.items() if len(own)}
+    figure = _draw_panels(estimates, groups, _strokes_by_group, draw, ("stroke", "$k_s$ (N/cm³)"), sharey="row")
+    for panel in figure.axes[:: max(len(groups), 1)]:
+        panel.set_ylim(bottom=0.0)
     return figure
 
 
-def _strokes_by_group(estimates: DataFrame, method: str) -> dict[str, DataFrame]:
-    return {name: strokes_of(own) for name, own in members_of(_recorded(estimates, method)).items()}
-
-
-def _recorded(estimates: DataFrame, method: str) -> DataFrame:
-    return estimates[(estimates["method"] == method) & (estimates["disturbance"] == RECORDED)]
+def _strokes_by_group(estimates: DataFrame) -> dict[str, DataFrame]:
+    recorded = estimates[estimates["disturbance"] == RECORDED]
+    return {name: strokes_of(own) for name, own in members_of(recorded).items()}
 
 
 def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
@@ -62,18 +57,21 @@ def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
 
 def draw_scatter(estimates: DataFrame) -> Figure:
     """Draw histograms of the deviations in claimed errors, over the groups on a fixed base."""
-    figure, panels = _panels(len(COEFFICIENTS))
-    for row, method in zip(panels, METHODS, strict=True):
-        groups = _strokes_by_group(estimates, method).values()
-        for panel, name in zip(row, COEFFICIENTS, strict=True):
-            strokes = [own[own["coefficient"] == name] for own in groups]
-            between_trials = [scatter_between_trials(each) for each in strokes]
-            between_strokes = [scatter_between_strokes(each) for each in strokes]
-            _draw_histogram(panel, [_standardized(between_trials), _standardized(between_strokes)])
-            panel.set_title(f"{LABELS[name]}, method {method}", **SMALL)
-            panel.set_xlabel("deviation / claimed error")
-    panels[0][0].legend(**SMALL)
+    figure = _draw_panels(estimates, LABELS, _strokes_by_group, _draw_deviations, ("deviation / claimed error", ""))
+    figure.axes[0].legend(**SMALL)
     return figure
+
+
+def _draw_deviations(panel: Axes, groups: Mapping[str, DataFrame], coefficient: str) -> None:
+    strokes = [own[own["coefficient"] == coefficient] for own in groups.values()]
+    deviations = [
+        _standardized([scatter_between_trials(each) for each in strokes]),
+        _standardized([scatter_between_strokes(each) for each in strokes]),
+    ]
+    edges, x = np.linspace(-WIDEST, WIDEST, 21).tolist(), np.linspace(-WIDEST, WIDEST, 201)
+    panel.hist(deviations, edges, stacked=True, color=(GREY, "tab:blue"), label=("between trials", "between strokes"))
+    expected = sum(map(len, deviations)) * (edges[1] - edges[0])
+    panel.plot(x, expected * np.exp(-x * x / 2.0) / np.sqrt(2.0 * pi), color=INK, label="normal")
 
 
 def _standardized(scatters: Sequence[Scatter]) -> NDArray[np.float64]:
@@ -85,42 +83,27 @@ def _standardized(scatters: Sequence[Scatter]) -> NDArray[np.float64]:
     return joined.clip(-WIDEST, WIDEST)
 
 
-def _draw_histogram(panel: Axes, deviations: Sequence[NDArray[np.float64]]) -> None:
-    edges, x = np.linspace(-WIDEST, WIDEST, 21).tolist(), np.linspace(-WIDEST, WIDEST, 201)
-    panel.hist(deviations, edges, stacked=True, color=(GREY, "tab:blue"), label=("between trials", "between strokes"))
-    expected = sum(map(len, deviations)) * (edges[1] - edges[0])
-    panel.plot(x, expected * np.exp(-x * x / 2.0) / np.sqrt(2.0 * pi), color=INK, label="normal")
-
-
 def draw_left_right(estimates: DataFrame) -> Figure:
     """Draw the left flipper's values over the right one's."""
-    figure, panels = _panels(len(COEFFICIENTS))
-    for row, method in zip(panels, METHODS, strict=True):
-        recorded = _recorded(estimates, method)
-        pairs = flipper_pairs(recorded[recorded["in_mud"].astype(bool)])
-        for panel, name in zip(row, COEFFICIENTS, strict=True):
-            _draw_pairs(panel, pairs[pairs["coefficient"] == name], COLOURS[name])
-            panel.set_title(f"{LABELS[name]}, method {method}", **SMALL)
-            panel.set_xlabel("left (N/cm³)")
-        row[0].set_ylabel("right (N/cm³)")
-    return figure
+    recorded = estimates[(estimates["disturbance"] == RECORDED) & estimates["in_mud"].astype(bool)]
+    return _draw_panels(recorded, LABELS, flipper_pairs, _draw_pairs, ("left (N/cm³)", "right (N/cm³)"))
 
 
-def _draw_pairs(panel: Axes, pairs: DataFrame, colour: str) -> None:
-    drawn = pairs[(pairs["value_left"] > 0.0) & (pairs["value_right"] > 0.0)]
+def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
+    is_drawn = (pairs["value_left"] > 0.0) & (pairs["value_right"] > 0.0)
+    drawn = pairs[is_drawn & (pairs["coefficient"] == coefficient)]
     if drawn.empty:
         return
     left, right, left_error, right_error = (
         drawn[name] / PER_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")
     )
+    colour = COLOURS[coefficient]
     panel.errorbar(left, right, right_error, left_error, fmt="o", color=colour, markersize=4, linewidth=1)
     ends = [0.8 * min(left.min(), right.min()), 1.25 * max(left.max(), right.max())]
     panel.plot(ends, ends, color=GREY, linewidth=1)
     panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
+        name_decades(axis)
 
 
 def draw_sensitivity(estimates: DataFrame) -> Figure:
@@ -130,19 +113,12 @@ def draw_sensitivity(estimates: DataFrame) -> Figure:
         EARLY: f"current {1000.0 * DELAY_S:g} ms early",
         MISSING: f"{100.0 * MISSING_ROWS:g} % of the rows missing",
     }
-    figure, panels = _panels(len(disturbances), sharey=True)
     mud = estimates[estimates["in_mud"].astype(bool)]
-    for row, method in zip(panels, METHODS, strict=True):
-        changes = disturbed_values(mud[mud["method"] == method])
-        for panel, (disturbance, title) in zip(row, disturbances.items(), strict=True):
-            _draw_ratios(panel, changes[changes["disturbance"] == disturbance])
-            panel.set_title(f"{title}, method {method}", **SMALL)
-        row[0].set_ylabel("disturbed / recorded")
-    return figure
+    return _draw_panels(mud, disturbances, disturbed_values, _draw_ratios, ("", "disturbed / recorded"), sharey=True)
 
 
-def _draw_ratios(panel: Axes, changes: DataFrame) -> None:
-    drawn = changes[changes["ratio"] > 0.0]
+def _draw_ratios(panel: Axes, changes: DataFrame, disturbance: str) -> None:
+    drawn = changes[(changes["disturbance"] == disturbance) & (changes["ratio"] > 0.0)]
     for number, name in enumerate(COEFFICIENTS):
         ratios = drawn.loc[drawn["coefficient"] == name, "ratio"].sort_values()
         x = number + np.linspace(-0.3, 0.3, len(ratios))
@@ -152,7 +128,22 @@ def _draw_ratios(panel: Axes, changes: DataFrame) -> None:
     panel.set_xticks(range(len(COEFFICIENTS)), [LABELS[name] for name in COEFFICIENTS], **SMALL)
 
 
-def _panels(columns: int, **shared: Any) -> tuple[Figure, NDArray[Any]]:
-    """Return a figure with a row of panels for each method."""
-    figure = Figure(figsize=(3.4 * max(columns, 2), 2.9 * len(METHODS)))
-    return figure, figure.subplots(len(METHODS), columns, squeeze=False, **shared)
+def _draw_panels(
+    estimates: DataFrame,
+    columns: Mapping[str, str],
+    prepare: Callable[[DataFrame], Any],
+    draw: Callable[[Axes, Any, str], None],
+    axis_names: tuple[str, str],
+    **shared: Any,
+) -> Figure:
+    """Draw a row of panels for each method, from what `prepare` makes of its estimates; `columns` have a title each."""
+    figure = Figure(figsize=(3.4 * max(len(columns), 2), 2.9 * len(METHODS)))
+    rows = figure.subplots(len(METHODS), max(len(columns), 1), squeeze=False, **shared)
+    for panels, method in zip(rows, METHODS, strict=True):
+        prepared = prepare(estimates[estimates["method"] == method])
+        for panel, (name, title) in zip(panels, columns.items(), strict=False):
+            draw(panel, prepared, name)
+            panel.set_title(f"{title}, method {method}", **SMALL)
+            panel.set_xlabel(axis_names[0])
+        panels[0].set_ylabel(axis_names[1])
+    return figure

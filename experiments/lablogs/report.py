@@ -87,10 +87,17 @@ def _method_summary(logs: Sequence[EvaluatedLog], estimates: DataFrame) -> Summa
     settings = {"delay_s": DELAY_S, "missing_fraction": MISSING_ROWS, "seeds": SEEDS}
     return {
         "groups": {
-            group: {name: _repeatability(own[own["coefficient"] == name]) for name in COEFFICIENTS}
+            group: {name: repeatability(strokes_of(each)) | count_kinds(each) for name, each in _by_coefficient(own)}
             for group, own in groups.items()
         },
-        "walks": {group: _walks(own) for group, own in groups.items() if not own["fixed_base"].all()},
+        "walks": {
+            group: {
+                name: count_kinds(each) | walk_scatter(name, each)
+                for name, each in _by_coefficient(own[~own["fixed_base"].astype(bool)])
+            }
+            for group, own in groups.items()
+            if not own["fixed_base"].all()
+        },
         "separation": _separations(groups),
         "left_right": agreements(flipper_pairs(mud)),
         "air": _stride_counts([log.name for log in logs if not log.in_mud], recorded[~in_mud]),
@@ -100,37 +107,27 @@ def _method_summary(logs: Sequence[EvaluatedLog], estimates: DataFrame) -> Summa
     }
 
 
-def _repeatability(own: DataFrame) -> dict[str, Any]:
-    """Return the counts over all strides, and the rest over trials on a fixed base."""
-    return repeatability(strokes_of(own)) | count_kinds(own)
-
-
-def _walks(own: DataFrame) -> dict[str, Any]:
-    """Return the scatter of the strides of walks in one mud, and what contradicts the depth law, by coefficient."""
-    walked = own[~own["fixed_base"].astype(bool)]
-    by_name = {name: walked[walked["coefficient"] == name] for name in COEFFICIENTS}
-    return {name: count_kinds(each) | walk_scatter(name, each) for name, each in by_name.items()}
-
-
 def _separations(groups: Mapping[str, DataFrame]) -> list[dict[str, Any]]:
     """Compare the first strokes of each two groups, the first group minus the second."""
-    firsts = {name: first_values(strokes_of(own)) for name, own in groups.items()}
+    firsts = {name: first_values(strokes_of(own)).set_index("coefficient")["value"] for name, own in groups.items()}
     found = []
-    for one, other in combinations(firsts, 2):
+    for pair in combinations(firsts, 2):
         for name in COEFFICIENTS:
-            values = [firsts[group].loc[firsts[group]["coefficient"] == name, "value"] for group in (one, other)]
-            distance = separation(*values)
+            one, other = (firsts[group][firsts[group].index == name] for group in pair)
+            distance = separation(one, other)
             if distance is not None:
-                counts = [len(each) for each in values]
-                found.append(
-                    {"groups": [one, other], "coefficient": name, "pooled_sd": round(distance, 4), "n": counts}
-                )
+                counts = [len(one), len(other)]
+                found.append({"groups": list(pair), "coefficient": name, "pooled_sd": round(distance, 4), "n": counts})
     return found
 
 
 def _stride_counts(names: Sequence[str], recorded: DataFrame) -> dict[str, Any]:
-    counts = {name: count_kinds(recorded[recorded["coefficient"] == name]) for name in COEFFICIENTS}
+    counts = {name: count_kinds(each) for name, each in _by_coefficient(recorded)}
     return {"logs": names, "strides": len(recorded) // len(COEFFICIENTS), **counts}
+
+
+def _by_coefficient(estimates: DataFrame) -> list[tuple[str, DataFrame]]:
+    return [(name, estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS]
 
 
 # tables for people

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from matplotlib import colormaps
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator
 
 from control.records import Phase
 
@@ -32,6 +34,13 @@ def line_of(look: dict[str, Any]) -> dict[str, Any]:
 
 def mark_of(look: dict[str, Any]) -> dict[str, Any]:
     return {"color": look["color"], "marker": look["marker"], "markersize": 7.0, "markeredgecolor": INK}
+
+
+def name_decades(axis: Axis) -> None:
+    """Write plain numbers at 1, 2 and 5 of each decade of a logarithmic axis."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
 
 
 def waters_of(muds: Sequence[str]) -> list[float] | None:

@@ -93,11 +93,13 @@ class Lockstep:
         motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
         failures: Failures | None = None,
         period_s: float = PERIOD_S,
+        buses: Mapping[str, Any] | None = None,
     ) -> None:
+        """`buses`: others than the mock ones; of each the robot opens an end first, then the loop."""
         self.period_s = period_s
         self.late_ticks = 0
         self.wall_offset_s = 0.0
-        self.buses = {name: MockBus() for name in configuration.bus}
+        self.buses = buses or {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
             plant or plant_of(configuration, disturbances, fixed_base),
             track,

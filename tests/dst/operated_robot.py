@@ -23,17 +23,17 @@ from firmware_host.daemon import Shutdown, end_safely
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.operator.operator_calls import Method, OperatorCalls
 from firmware_host.sockets.connection import Caller
-from firmware_host.sockets.rights import Group, Peer, Rights
+from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import REQUEST, RefusedError
 from firmware_host.sockets.socket_file import operators_path
 from firmware_host.sockets.status_socket import StatusSocket
 from simulation.harness.joint_energy import JointEnergy
 from tests.dst.scenario import HARMING, Call, Drift, Event, Failure, HangUp, Restart, Send, Suspend, Terminate
 from tests.dst.suspension import Suspension
+from tests.firmware_host.sockets.served_socket import RIGHTS
 from verification.faults.failing_robot import FailingRobot
 from verification.faults.injection import inject
 
-RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
 INTRUDERS = 12  # connections of one operator who wants all of them
 PEERS = {
     "pilot": Peer(500, 1000, frozenset({1000, 71})),

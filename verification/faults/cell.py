@@ -16,11 +16,17 @@ from control.rate import PERIOD_S
 from drivers.drive_types import DEFAULT
 from drivers.fault_injection.failure_table import REPORTED_S, FailureMode
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
-from verification.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
+from simulation.harness.joint_energy import JointEnergy
+from verification.faults.energy_bounds import (
+    DELAY_TICKS,
+    SLEWING_TICKS,
+    WATCHDOG_TICKS,
+    energy_bound_j,
+    pushing_bound_ticks,
+)
 from verification.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from verification.faults.failing_robot import FaultBench
 from verification.faults.injection import inject
-from verification.faults.motor_energy import MotorEnergy
 from verification.faults.phases import bench_for, enter_phase
 from verification.faults.protocol_differences import mode_of
 
@@ -98,7 +104,8 @@ class Measurement:
         self._disarmed_steps = 0
         self._travel_rad = 0.0
         self._restarted = mode.restarted
-        self._energy = MotorEnergy(bench, mode)
+        self._walked_s = 0.0
+        self._work = JointEnergy(bench.robot, bench.loop.configuration.joint_ranges)
 
     def run(self, duration_s: float, until_reported: bool = False) -> None:
         most_ticks = self._failure.fault_kind.bound_ticks * 2 + 10 if until_reported and self._failure.fault_kind else 0
@@ -165,7 +172,8 @@ class Measurement:
 
     def _measure_robot(self) -> None:
         cell, bench = self._cell, self._bench
-        self._energy.step()
+        if bench.loop.mode in (Mode.WALKING, Mode.STOPPING):
+            self._walked_s += PERIOD_S
         torque_nm = max(map(abs, bench.torques_nm()))
         cell.peak_torque_nm = max(cell.peak_torque_nm, torque_nm)
         if torque_nm:
@@ -232,7 +240,9 @@ class Measurement:
         cell.rows_lost = self._ticks - sum(kind == TICK_KIND for kind, _ in rows)
         if self._steps - self._last_torque_steps > DELAY_TICKS:
             cell.zero_torque_ticks = self._last_torque_steps
-        self._energy.record(cell)
+        cell.energy_j, cell.pushed_ticks = self._work.energy_j, round(self._work.pushed_s / PERIOD_S)
+        cell.energy_bound_j = energy_bound_j(bench.loop.configuration, self._failure, cell.reported, self._walked_s)
+        cell.pushed_bound_ticks = pushing_bound_ticks(self._failure)
         if not self._walks_on:
             cell.travel_rad = self._travel_rad
         if self._failure.ends_loop:

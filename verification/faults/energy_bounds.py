@@ -17,20 +17,23 @@ the torque and the reaction add a path at the speed ω:
     E = E_0 e^(nT / t_l) + τ ω (2 + 2) T
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from math import ceil, exp, radians
 
-from control.faults import FaultKind, Reaction
+from control.faults import FAULT_KINDS, FaultKind, Reaction
 from control.gait.gait import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.monitors.joint_monitor import FAST_FRACTION
 from control.monitors.motion_monitor import RUNAWAY_LEAK_S, runaway_bound_j
 from control.rate import PERIOD_S
+from drivers.fault_injection.failure_table import FailureMode
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import END_STOPS_RAD
 
 DELAY_TICKS = 2  # from the loop's torque to the motor's
 SLEWING_TICKS = 3  # from full torque to the largest damping in the other direction, at the torque's slew rate
+REACTING_TICKS = SLEWING_TICKS + DELAY_TICKS
 WATCHDOG_TICKS = 40  # 0.1 s, and one tick for the command to the drive and one for its answer
 DEEPEST_M = 0.05  # the deepest insertion of the paper
 STOP_TO_STOP_RAD = 2.0 * max(END_STOPS_RAD)
@@ -97,6 +100,32 @@ class EnergyBounds:
 def detection_ticks(kind: FaultKind) -> int:
     """Return the ticks for which the motors may still exert any torque after the onset."""
     return max(kind.bound_ticks, WATCHDOG_TICKS) if kind in BY_WATCHDOG else kind.bound_ticks
+
+
+def energy_bound_j(configuration: Configuration, mode: FailureMode, reported: Iterable[str], walked_s: float) -> float:
+    """Return the bound since the onset of a failure, after which these faults were reported."""
+    bounds = energy_bounds(configuration)
+    if mode.torque_nm:
+        bounds = replace(bounds, torque_nm=mode.torque_nm)
+    if mode.restarted:
+        return bounds.stopping_j(round(mode.lasts_s / PERIOD_S), Reaction.DRIVES_IDLE)
+    if mode.ends_loop:
+        return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
+    if mode.fault_kind and mode.fault_kind.reaction in STOPPING and not mode.waived:
+        return bounds.fault_j(mode.fault_kind, WATCHDOG_TICKS if mode.loses_commands else 0)
+    kinds = (FAULT_KINDS[name] for name in reported)
+    stopped_j = [bounds.fault_j(kind) for kind in kinds if kind.reaction in STOPPING]
+    return max(bounds.walking_j(walked_s), *stopped_j, 0.0)
+
+
+def pushing_bound_ticks(mode: FailureMode) -> int:
+    """Return the ticks for which a motor may push against an end stop: until the reaction takes effect."""
+    if mode.restarted:
+        return round(mode.lasts_s / PERIOD_S) + REACTING_TICKS
+    if mode.ends_loop or mode.loses_commands:
+        return WATCHDOG_TICKS
+    kind = FAULT_KINDS[mode.pushes_until] if mode.pushes_until else mode.fault_kind
+    return REACTING_TICKS + (detection_ticks(kind) if kind and kind.reaction in STOPPING else 0)
 
 
 def energy_bounds(configuration: Configuration) -> EnergyBounds:

@@ -1,7 +1,4 @@
-"""The phases of operation in which failures are injected: at rest, arming, every phase of a stride, stopping.
-
-Each phase has a function that operates a robot from power-on into the phase, plus a random number of ticks.
-"""
+"""The phases of operation in which failures are injected: at rest, arming, every phase of a stride, stopping."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -57,64 +54,50 @@ def _as_real(drive: DriveParameters) -> DriveParameters:
 
 
 def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:
-    """Operate the robot into the phase. Raises RuntimeError where it does not get there.
+    """Operate the robot from power-on into the phase, plus a random number of ticks.
 
     Every drive has its time to answer first: what it has not said by then is in the log before the failure begins.
+    Raises RuntimeError where the robot does not get into the phase.
     """
-    answered_s = bench.now_s + ANSWERED_S
+    loop, answered_s = bench.loop, bench.now_s + ANSWERED_S
     _reach(bench, "answers", lambda: bench.now_s > answered_s)
-    _PHASE_ENTRIES[phase](bench, random)
+    match phase:
+        case "idle" | "arming":
+            _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(bench.forced))
+            _wait(bench, random, 100)
+            if phase == "arming":
+                _begin_arming(bench, random)
+        case "hold":
+            bench.arm()
+            _wait(bench, random, 250)
+        case "recovery":
+            bench.arm()
+            bench.walk(DEEP)
+            _reach(bench, phase, lambda: loop.controller.target.phase is Phase.RECOVERY)
+            if loop.configuration.recovery != SHORT_RECOVERY:
+                _wait(bench, random, 400)
+        case "stopping":
+            _walk_into(bench, random.choice((Phase.INSERTION, Phase.STANCE)), random)
+            loop.request(Request.STOP, bench.now_s)
+            bench.step()
+            _wait(bench, random, 60)
+        case _:
+            _walk_into(bench, Phase[phase.upper()], random)
 
 
-def _to_idle(bench: FaultBench, random: Random) -> None:
-    loop = bench.loop
-    _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(bench.forced))
-    _wait(bench, random, 100)
-
-
-def _to_arming(bench: FaultBench, random: Random) -> None:
+def _begin_arming(bench: FaultBench, random: Random) -> None:
     """Stop in a tick before closed loop is requested, or while drives enter it, which takes 1 to 38 ticks."""
-    _to_idle(bench, random)
     _reach(bench, "arming", lambda: bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced) is None)
     for _ in range(random.randint(0, 8)):
         if bench.loop.mode is not Mode.HOLD:
             bench.step()
 
 
-def _to_hold(bench: FaultBench, random: Random) -> None:
-    bench.arm()
-    _wait(bench, random, 250)
-
-
-def _to_walk(bench: FaultBench, random: Random) -> None:
+def _walk_into(bench: FaultBench, phase: Phase, random: Random) -> None:
     bench.arm()
     bench.walk(WalkOrder(FIRST_DEPTH_M))
-
-
-def _to_phase_of_gait(phase: Phase) -> Callable[[FaultBench, Random], None]:
-    def go(bench: FaultBench, random: Random) -> None:
-        _to_walk(bench, random)
-        _reach(bench, phase.name.lower(), lambda: bench.loop.controller.target.phase is phase)
-        delay = random.randint(0, STRIDE_TICKS[phase])
-        for _ in range(delay):
-            bench.step()
-
-    return go
-
-
-def _to_stopping(bench: FaultBench, random: Random) -> None:
-    _to_phase_of_gait(random.choice((Phase.INSERTION, Phase.STANCE)))(bench, random)
-    bench.loop.request(Request.STOP, bench.now_s)
-    bench.step()
-    _wait(bench, random, 60)
-
-
-def _to_recovery(bench: FaultBench, random: Random) -> None:
-    bench.arm()
-    bench.walk(DEEP)
-    _reach(bench, "recovery", lambda: bench.loop.controller.target.phase is Phase.RECOVERY)
-    if bench.loop.configuration.recovery != SHORT_RECOVERY:
-        _wait(bench, random, 400)
+    _reach(bench, phase.name.lower(), lambda: bench.loop.controller.target.phase is phase)
+    _wait(bench, random, STRIDE_TICKS[phase])
 
 
 def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
@@ -125,13 +108,3 @@ def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
 def _wait(bench: FaultBench, random: Random, most_ticks: int) -> None:
     for _ in range(random.randint(0, most_ticks)):
         bench.step()
-
-
-_PHASE_ENTRIES: dict[str, Callable[[FaultBench, Random], None]] = {
-    "idle": _to_idle,
-    "arming": _to_arming,
-    "hold": _to_hold,
-    **{phase.name.lower(): _to_phase_of_gait(phase) for phase in STRIDE_TICKS},
-    "stopping": _to_stopping,
-    "recovery": _to_recovery,
-}

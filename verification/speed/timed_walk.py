@@ -21,17 +21,12 @@ from control.modes import Mode
 from control.rate import PERIOD_S, RATE_HZ
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import Recorder, Recording
-from firmware_host.loop import Loop
+from firmware_host.log.recorder import Recorder
 from firmware_host.software_version import is_compiled
 from firmware_host.ticker import Tick
-from simulation.devices.motion_capture import SimulatedPose
-from simulation.devices.motion_capture_parameters import AT_EVERY_TICK
-from simulation.harness.lockstep import Lockstep, drives_of, plant_of
-from simulation.harness.robot import SimulatedRobot
+from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from verification.benchmark import Report
 from verification.wiring import PortPair, open_wiring
@@ -40,7 +35,6 @@ BLOCK_TICKS = round(RATE_HZ)
 COLD_FRACTION = 4  # one cold tick for so many hot ones, because they take real time
 WARM_UP_S = 2.0  # to the end of the first stride
 FRAME_BYTES = 16  # of a classic CAN frame, as the kernel passes it on
-POSE_SEED = 2
 STAGES = {  # in their order, by the loop's method that begins each
     "read": "drives.read",  # drain the buses, decode
     "pose": "pose.read",  # simulated here
@@ -73,6 +67,16 @@ class CountedPort:
     def send(self, frame: Frame) -> None:
         self.sent += 1
         self._port.send(frame)
+
+
+class OpenedBus:
+    """A bus whose two ends are open already: the robot's and the loop's."""
+
+    def __init__(self, robot: CanPort, loop: CountedPort) -> None:
+        self._ends = [loop, robot]
+
+    def open(self) -> Any:
+        return self._ends.pop()
 
 
 class BareSockets:
@@ -112,11 +116,10 @@ class TimedWalk:
     """Owns the walk, the bare sockets that carry as many frames, and the measured durations in seconds."""
 
     def __init__(self, configuration: Configuration, wiring: dict[str, PortPair], recorder: Recorder) -> None:
-        self.walk = Lockstep(configuration, paper_track())
         self.recorder = recorder
-        robot_ports = {name: robot for name, (robot, _) in wiring.items()}
-        loop_ports: dict[str, Any] = {name: CountedPort(loop) for name, (_, loop) in wiring.items()}
-        _wire(self.walk, configuration, robot_ports, loop_ports, recorder)
+        loop_ports = {name: CountedPort(loop) for name, (_, loop) in wiring.items()}
+        buses = {name: OpenedBus(robot, loop_ports[name]) for name, (robot, _) in wiring.items()}
+        self.walk = Lockstep(configuration, paper_track(), recorder=recorder, buses=buses)
         self._warm_up()
         before = [(port.received, port.sent) for port in loop_ports.values()]
         for _ in range(BLOCK_TICKS):
@@ -222,27 +225,3 @@ def open_timed_walk(configuration: Configuration, bus: str, folder: Path) -> Ite
         walk = TimedWalk(configuration, wiring, recorder)
         stack.callback(walk.bare.close)
         yield walk
-
-
-def _wire(
-    walk: Lockstep,
-    configuration: Configuration,
-    robot_ports: dict[str, CanPort],
-    loop_ports: dict[str, CanPort],
-    recorder: Recording,
-) -> None:
-    """Replace robot and loop of a lockstep that has not begun; the robot is on the paper's track."""
-    walk.robot = SimulatedRobot(
-        plant_of(configuration),
-        paper_track(),
-        drives_of(configuration),
-        configuration.bus_of,
-        robot_ports,
-    )
-    drives = make_drives(configuration.drive, loop_ports, configuration.limits, configuration.watchdog_endpoints)
-    pose = SimulatedPose(walk.robot.plant, AT_EVERY_TICK, POSE_SEED)
-
-    def now_s() -> float:
-        return walk.now_s
-
-    walk.loop = Loop(configuration, drives, pose, recorder, now_s, now_s)

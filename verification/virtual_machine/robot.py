@@ -52,10 +52,6 @@ class Robot:
         report: dict[str, Any] = json.loads(self.operate("status", "--json").output)
         return report
 
-    def checks(self) -> dict[str, dict[str, Any]]:
-        """Return the lines of `mudskipper check` by their identity."""
-        return {item["id"]: item for item in json.loads(self.operate("check", "--json").output)}
-
     def unit(self, name: str) -> str:
         """Return a property of the service from systemd."""
         return self.shell(f"systemctl show --value --property={name} mudskipper").strip()
@@ -63,9 +59,9 @@ class Robot:
     def journal(self) -> str:
         return self.machine.run("journalctl --boot --unit=mudskipper --no-pager --output=cat --lines=40").output
 
-    def wait_for(self, condition: str, longest_s: float = 20.0) -> None:
+    def wait_for(self, condition: str) -> None:
         """Wait until a shell command succeeds."""
-        self.shell(f"until {condition}; do sleep 0.5; done", longest_s)
+        self.shell(f"until {condition}; do sleep 0.5; done", 20.0)
 
     def wait_until_answers(self) -> None:
         self.wait_for("mudskipper status --json | grep -q closed_loop")

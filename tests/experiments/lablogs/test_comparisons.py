@@ -34,17 +34,14 @@ def test_flippers_differ_by_0_67_of_a_right_error(claimed: float) -> None:
 
 
 def test_only_strides_with_two_values_are_compared_and_no_single_flipper_is() -> None:
+    """A flipper that leaves the mud late is compared too: its stride closes up to 0.3 s after the other's."""
     free_of_error = (make_value(1.0, 0.0), make_value(2.0, 0.0)), (make_value(1.0), make_value(float("nan")))
     some = (make_value(1.0), make_bound(2.0)), (INVALID, make_value(1.0)), (make_value(1.0),) * 2
     single = make_log([make_stride(k_s=make_value(1.0))])
     assert len(flipper_pairs(by_default(make_walk([*free_of_error, *some]), single))) == 1
-
-
-def test_a_flipper_that_leaves_the_mud_late_is_compared_too() -> None:
-    """Its stride closes up to 0.3 s after the other flipper's."""
     left, right = (make_stride(flipper, k_s=make_value(1.0)) for flipper in ("left", "right"))
-    walk = make_log([replace(left, t_end_s=left.t_end_s + 0.25), right], flippers=("left", "right"))
-    assert len(flipper_pairs(by_default(walk))) == 1
+    late = make_log([replace(left, t_end_s=left.t_end_s + 0.25), right], flippers=("left", "right"))
+    assert len(flipper_pairs(by_default(late))) == 1
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -42,23 +43,7 @@ def test_groups_are_in_the_order_of_strength() -> None:
 
 
 def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_one(tmp_path: Path) -> None:
-    trials = ("a/run-0002_A_1.mcap", "a/run-0003_A_1.mcap", "a/run-0004_A_2.mcap", "a/run-0005.mcap")
-    logs = (
-        "a/one.csv",
-        "a/b/two.csv.gz",
-        "a/run-0000.mcap",
-        "a/run-0001.mcap",
-        *trials,
-        "a/bench-0001.mcap",
-        "a/c.txt",
-    )
-    for name in logs:
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    found = find_logs([tmp_path, tmp_path / "a" / "b", tmp_path / "a" / "one.csv"])
-    names = [[path.name for path in paths] for paths in found]
-    assert sorted(names) == [
+    runs = [
         ["bench-0001.mcap"],
         ["one.csv"],
         ["run-0000.mcap", "run-0001.mcap"],
@@ -67,3 +52,9 @@ def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_o
         ["run-0005.mcap"],
         ["two.csv.gz"],
     ]
+    below = tmp_path / "a" / "b"
+    below.mkdir(parents=True)
+    for name in ("c.txt", *chain(*runs)):
+        (below / name if name.startswith("two") else below.parent / name).touch()
+    found = find_logs([tmp_path, below, tmp_path / "a" / "one.csv"])
+    assert sorted([path.name for path in paths] for paths in found) == runs

@@ -42,23 +42,17 @@ def test_the_variation_of_first_strokes_is_the_sample_deviation_over_the_mean() 
     first = first_values(k_s_strokes(declining_trials()))["value"]
     assert coefficient_of_variation(first) == pytest.approx(0.1)
     assert coefficient_of_variation(first[:1]) is None
-
-
-def test_bounds_and_invalid_first_strokes_are_no_values() -> None:
     trials = [[make_bound(9.0), make_value(1.0)], [INVALID], [], [make_value(2.0)]]
-    assert first_values(k_s_strokes(trials))["value"].tolist() == [2.0]
+    assert first_values(k_s_strokes(trials))["value"].tolist() == [2.0]  # bounds and invalid strokes are no values
 
 
-def test_the_variation_of_later_strokes_is_free_of_their_decline() -> None:
-    levels = later_levels(k_s_strokes(declining_trials()))
+@pytest.mark.parametrize(("lengths", "later"), [((5, 5, 5), DECLINE[1:]), ((5, 3, 4), DECLINE[1:3])])
+def test_later_strokes_vary_without_their_decline_over_the_number_that_all_trials_have(
+    lengths: tuple[int, int, int], later: tuple[float, ...]
+) -> None:
+    levels = later_levels(k_s_strokes(declining_trials(lengths)))
     assert coefficient_of_variation(levels) == pytest.approx(0.1)
-    geometric_mean = np.prod(DECLINE[1:]) ** 0.25
-    assert levels.tolist() == pytest.approx([level * geometric_mean for level in LEVELS])
-
-
-def test_trials_of_different_lengths_are_compared_over_the_same_number_of_strokes() -> None:
-    levels = later_levels(k_s_strokes(declining_trials((5, 3, 4))))
-    assert levels.tolist() == pytest.approx([level * (DECLINE[1] * DECLINE[2]) ** 0.5 for level in LEVELS])
+    assert levels.tolist() == pytest.approx([level * np.prod(later) ** (1.0 / len(later)) for level in LEVELS])
 
 
 def test_a_missing_later_stroke_does_not_lift_its_trial() -> None:
@@ -85,13 +79,10 @@ def test_chi_is_the_true_scatter_over_the_claimed_one(claimed: float, chi: float
     assert repeatability(trials)["chi"] == pytest.approx(chi, rel=0.1)
 
 
-def test_a_common_decline_is_no_scatter_between_strokes() -> None:
+def test_a_common_decline_is_no_scatter_and_without_repetitions_there_is_none() -> None:
     assert scatter_between_strokes(k_s_strokes(declining_trials())).chi == pytest.approx(0.0, abs=1e-9)
-
-
-def test_chi_is_unknown_without_repetitions() -> None:
-    assert scatter_between_trials(k_s_strokes([[make_value(1.0)]])).chi is None
-    assert scatter_between_strokes(k_s_strokes([[make_value(1.0), make_value(0.8), make_value(0.7)]])).chi is None
+    once = k_s_strokes([[make_value(1.0), make_value(0.8), make_value(0.7)]])
+    assert scatter_between_trials(once).chi is scatter_between_strokes(once).chi is None
     assert scatter_between_strokes(k_s_strokes([])).chi is None
 
 
