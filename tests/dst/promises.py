@@ -34,14 +34,22 @@ class Promise:
     def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
         self.robot = robot
         self.loop = robot.loop
+        self.mechanics = robot.lockstep.robot
         self.reach = reach
+        self.broken: list[str] = []  # found in the steps of the mechanics since the last tick
         self.begin()
+        if type(self).measure is not Promise.measure:
+            self.mechanics.observers.append(self.measure)
 
     def begin(self) -> None:
         """Set the state before the first tick."""
 
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
+        """Observe a step of the mechanics."""
+
     def update(self) -> Iterator[str]:
-        yield from ()
+        yield from self.broken
+        self.broken = []
 
 
 class NoTorqueWithoutMode(Promise):
@@ -49,24 +57,20 @@ class NoTorqueWithoutMode(Promise):
 
     def begin(self) -> None:
         self._off_since_s: float | None = None
-        self.robot.lockstep.robot.observers.append(self._measure)
-        self._late: dict[int, float] = {}
 
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
         if self._off_since_s is None:
             return
-        off_s = self.robot.lockstep.robot.now_s - self._off_since_s
+        off_s = self.mechanics.now_s - self._off_since_s
         least_nm = self.reach.cogging_nm + ROUNDING_NM
         for index, torque_nm in enumerate(torques_nm):
             if abs(torque_nm) > least_nm and off_s > self.reach.longest_s(index, ON_THE_WAY_TICKS):
-                self._late[index] = torque_nm
+                self.broken.append(f"{JOINTS[index]} has {torque_nm:.3f} N·m in mode {self.loop.mode.name.lower()}")
 
     def update(self) -> Iterator[str]:
         off = self.loop.mode not in ENERGISED or self.robot.ended
         self._off_since_s = (self._off_since_s or self.robot.now_s) if off else None
-        for index, torque_nm in self._late.items():
-            yield f"{JOINTS[index]} has {torque_nm:.3f} N·m in mode {self.loop.mode.name.lower()}"
-        self._late.clear()
+        return super().update()
 
 
 class LimitedMotors(Promise):
@@ -79,17 +83,15 @@ class LimitedMotors(Promise):
         drive = self.loop.configuration.drive
         self._codes_nm = [type_of(drive[joint]).gate_table(drive[joint]).torque_step_nm for joint in JOINTS]
         self._torques_nm: Torques | None = None  # one step of the mechanics ago
-        drives = self.robot.lockstep.robot.drives
+        drives = self.mechanics.drives
         self._fast_rad_s = [min(limits.velocity_rad_s, each.no_load_rad_s) for each in drives]
-        self._before_nm = [drive.torque_nm(self.robot.lockstep.robot.now_s) for drive in drives]  # as commanded
+        self._before_nm = [drive.torque_nm(self.mechanics.now_s) for drive in drives]  # as commanded
         self._fast_s = [NEVER_S] * len(JOINTS)
         self._changed_s = [self.robot.now_s] * len(JOINTS)
-        self._broken: list[str] = []
-        self.robot.lockstep.robot.observers.append(self._measure)
 
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
         """Check the motors whose torque changed or is large."""
-        robot = self.robot.lockstep.robot
+        robot = self.mechanics
         self._torques_nm = self._torques_nm or torques_nm
         for index, torque_nm in enumerate(torques_nm):
             speed_rad_s = robot.plant.velocities_rad_s[index] if torque_nm else 0.0
@@ -107,7 +109,7 @@ class LimitedMotors(Promise):
         if now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
             braking = commanded_nm * speed_rad_s < 0.0
             if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
-                self._broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
+                self.broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
             self._check_slew(index, commanded_nm, 2.0 * rounding_nm + 0.5 * self._codes_nm[index], now_s)
         if commanded_nm != self._before_nm[index]:
             self._before_nm[index], self._changed_s[index] = commanded_nm, now_s
@@ -119,11 +121,7 @@ class LimitedMotors(Promise):
         grown_nm = abs(torque_nm) - abs(before_nm) if torque_nm * before_nm > 0.0 else abs(torque_nm)
         if grown_nm > self._rate_nm_s * since_s + rounding_nm:
             step = f"{before_nm:.3f} to {torque_nm:.3f} N·m"
-            self._broken.append(f"{JOINTS[index]} goes from {step} within {1e3 * since_s:.1f} ms")
-
-    def update(self) -> Iterator[str]:
-        yield from self._broken
-        self._broken = []
+            self.broken.append(f"{JOINTS[index]} goes from {step} within {1e3 * since_s:.1f} ms")
 
 
 class StopInTime(Promise):
@@ -179,7 +177,7 @@ class ArmedByRequest(Promise):
 
     def _check_drives(self) -> Iterator[str]:
         off = self.loop.mode not in ENERGISED
-        for index, drive in enumerate(self.robot.lockstep.robot.drives):
+        for index, drive in enumerate(self.mechanics.drives):
             on = off and drive.energised and not self.reach.is_energised_by_others(index)
             self._energised_s[index] = self._energised_s[index] + self.loop.period_s if on else 0.0
             if self._energised_s[index] > self.reach.longest_idling_s(index):
@@ -203,24 +201,15 @@ class SilentLoop(Promise):
 
     LONGEST_S = WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
 
-    def begin(self) -> None:
-        self._late: dict[int, float] = {}
-        self.robot.lockstep.robot.observers.append(self._measure)
-
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
-        robot = self.robot.lockstep.robot
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
+        robot = self.mechanics
         if robot.now_s - self.robot.heard_s < self.LONGEST_S:
             return
         velocities_rad_s, least_nm = robot.plant.velocities_rad_s, self.reach.cogging_nm + ROUNDING_NM
         for index, torque_nm in enumerate(torques_nm):
             drives = abs(torque_nm) > least_nm and torque_nm * velocities_rad_s[index] > 0.0
             if drives and not self.reach.is_foreign(index):
-                self._late[index] = torque_nm
-
-    def update(self) -> Iterator[str]:
-        for index, torque_nm in self._late.items():
-            yield f"{JOINTS[index]} is driven with {torque_nm:.3f} N·m although the loop is silent"
-        self._late.clear()
+                self.broken.append(f"{JOINTS[index]} is driven with {torque_nm:.3f} N·m although the loop is silent")
 
 
 class TrueTorque(Promise):
@@ -238,16 +227,15 @@ class TrueTorque(Promise):
         self._limit_nm = self.STRONG * self.loop.configuration.limits.torque_nm
         self._longest_s = energy_bounds(self.loop.configuration).stride_s
         self._reset()
-        self.robot.lockstep.robot.observers.append(self._measure)
 
     def _reset(self) -> None:
         self._excess_j, self._lowest_j = [0.0] * len(JOINTS), [0.0] * len(JOINTS)
         self._beyond_s = [0.0] * len(JOINTS)
 
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
         if max(self.reach.gains) < self.STRONG:
             return
-        velocities_rad_s = self.robot.lockstep.robot.plant.velocities_rad_s
+        velocities_rad_s = self.mechanics.plant.velocities_rad_s
         for index, (torque_nm, gain) in enumerate(zip(torques_nm, self.reach.gains, strict=True)):
             if gain < self.STRONG or self.reach.is_foreign(index):
                 continue
@@ -281,12 +269,11 @@ class WithinStops(Promise):
     def begin(self) -> None:
         self._pressed_s = [0.0] * len(JOINTS)
         self._free_s = [0.0] * len(JOINTS)
-        self.robot.lockstep.robot.observers.append(self._measure)
 
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+    def measure(self, dt_s: float, torques_nm: Torques) -> None:
         if max(torques_nm) < self.PRESSING_NM and min(torques_nm) > -self.PRESSING_NM and not any(self._pressed_s):
             return
-        angles_rad = self.robot.lockstep.robot.plant.angles_rad
+        angles_rad = self.mechanics.plant.angles_rad
         for index, (torque_nm, angle_rad) in enumerate(zip(torques_nm, angles_rad, strict=True)):
             inwards_nm = torque_nm if angle_rad > 0.0 else -torque_nm
             pressed = inwards_nm >= self.PRESSING_NM and abs(angle_rad) > END_STOPS_RAD[index % 2] - AT_STOP_RAD
@@ -303,7 +290,7 @@ class WithinStops(Promise):
                 yield f"{joint} is pressed against its stop for {pressed_s:.2f} s"
 
     def _is_hidden(self, index: int) -> bool:
-        is_frozen = self.robot.lockstep.robot.drives[index].parameters.encoder_frozen
+        is_frozen = self.mechanics.drives[index].parameters.encoder_frozen
         return is_frozen and abs(self.loop.sent.torques_nm[index]) < YIELDING_NM
 
 
@@ -354,11 +341,11 @@ class BoundedEnergy(Promise):
         self._bounds = energy_bounds(self.loop.configuration)
         self._rise = EnergyRise(self.robot, self.reach)
         self._held_s = self._stopping_j = self._excess_j = 0.0
-        self._before_s = self.robot.lockstep.robot.now_s
+        self._before_s = self.mechanics.now_s
         self._strongest, self._was_on = 1.0, False
 
     def update(self) -> Iterator[str]:
-        now_s = self.robot.lockstep.robot.now_s  # of the mechanics, which go on while the process stands still
+        now_s = self.mechanics.now_s  # of the mechanics, which go on while the process stands still
         since_s, self._before_s = now_s - self._before_s, now_s
         if not self.robot.harmed:
             self._rise.reset()

@@ -6,7 +6,6 @@ robot travel along as `Debts`, so that no promise relies on the code that it che
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from control.controller import DAMPING_S, SOFT_STOP_S
@@ -122,135 +121,103 @@ def _moves_or_will(memory: Memory) -> bool:
 # promises
 
 
-def _arms_by_request(edge: TickEdge) -> bool:
-    asked = (edge.before.mode, edge.before.pending, edge.after.mode) == (Mode.IDLE, Request.ARM, Mode.ARMING)
-    return not edge.energises or (asked and not edge.before.ending)
+def _kept_in_arming(edge: TickEdge) -> dict[str, bool]:
+    """Return whether each promise about the way to torque is kept."""
+    before, after, present = edge.before, edge.after, edge.present
+    asked = (before.mode, before.pending, after.mode) == (Mode.IDLE, Request.ARM, Mode.ARMING) and not before.ending
+    blocking = [
+        kind
+        for kind in present
+        if kind.blocks >= (Blocks.ALWAYS if kind.value == before.forced else Blocks.UNLESS_FORCED)
+    ]
+    unblocked = not blocking and edge.reaction < Reaction.HOLD and not edge.debts.uncleared
+    begins = after.mode in MOVING and before.mode not in MOVING
+    return {
+        "torque goes on only by a request to arm": not edge.energises or asked,
+        "the robot arms with no fault that blocks arming or is not cleared": not edge.energises or unblocked,
+        "a joint moves only when every drive has confirmed this arming": (
+            not begins or before.mode is Mode.ARMING and edge.was_closed
+        ),
+        "a drive is asked for closed loop only while arming": not edge.asked_closed or after.mode is Mode.ARMING,
+        "a drive is prepared before it is asked for closed loop": not edge.asked_unprepared,
+        "torque is commanded only in modes that may": not edge.torque or after.mode in MOVING,
+        "the gate is open only while torque may be on": edge.gate_open == (after.mode in ENERGISED),
+        "force ends with the torque": not after.forced or after.mode in ENERGISED,
+    }
 
 
-def _arms_only_unblocked(edge: TickEdge) -> bool:
-    forced = edge.before.forced
-    least = {kind: Blocks.ALWAYS if kind.value == forced else Blocks.UNLESS_FORCED for kind in edge.present}
-    blocked = any(kind.blocks >= least[kind] for kind in edge.present) or edge.reaction >= Reaction.HOLD
-    return not edge.energises or not (blocked or edge.debts.uncleared)
+def _kept_in_motion(edge: TickEdge) -> dict[str, bool]:
+    """Return whether each promise about motion and its end is kept."""
+    before, after, reaction = edge.before, edge.after, edge.reaction
+    walks = after.mode is Mode.WALKING and before.mode is not Mode.WALKING
+    asked = (before.mode, before.pending) == (Mode.HOLD, Request.WALK) and not before.ending
+    stops = (before.mode, before.pending) == (Mode.WALKING, Request.STOP)
+    disarms = before.pending is Request.DISARM and after.mode in ENERGISED
+    ended = before.mode in ENERGISED and after.mode not in ENERGISED
+    left_fault = before.mode is Mode.FAULT and after.mode is not Mode.FAULT
+    if after.mode is Mode.ARMING:
+        is_hard_enough = reaction < Reaction.SOFT_STOP
+    else:
+        is_hard_enough = after.mode not in ENERGISED or HARDNESS[after.mode] >= MILDEST[reaction]
+    return {
+        "a walk begins only by a request, without a fault that holds": not walks or asked and reaction < Reaction.HOLD,
+        "every detected fault is present": edge.found <= {each.kind for each in after.faults},
+        "the hardest reaction counts at once": is_hard_enough,
+        "disarm, and every end of torque, asks all drives to go idle at once": (
+            not disarms and (not ended or edge.asked_idle and not after.obedient.closed)
+        ),
+        "a stop ends a walk at once": not stops or after.mode in (Mode.STOPPING, Mode.DAMPING, Mode.FAULT),
+        "a stop does not turn into a walk": before.mode is not Mode.STOPPING or after.mode is not Mode.WALKING,
+        "stopping and damping end in time": after.mode_ticks <= LONGEST_TICKS.get(after.mode, after.mode_ticks),
+        "motion ends when its operator is lost": (
+            not edge.debts.abandoned or after.mode not in (Mode.ARMING, Mode.HOLD, Mode.WALKING)
+        ),
+        "a move goes on only in hold and without a fault": (
+            not after.moving or after.mode is Mode.HOLD and reaction < Reaction.HOLD
+        ),
+        "a fault ends in idle, once no fault is present that stops": (
+            not left_fault or after.mode is Mode.IDLE and reaction < Reaction.SOFT_STOP
+        ),
+        "a request is answered once": after.pending is Request.NONE,
+    }
 
 
-def _walks_by_request(edge: TickEdge) -> bool:
-    if edge.after.mode is not Mode.WALKING or edge.before.mode is Mode.WALKING:
-        return True
-    asked = (edge.before.mode, edge.before.pending) == (Mode.HOLD, Request.WALK)
-    return asked and not edge.before.ending and edge.reaction < Reaction.HOLD
-
-
-def _moves_when_confirmed(edge: TickEdge) -> bool:
-    begins = edge.after.mode in MOVING and edge.before.mode not in MOVING
-    return not begins or (edge.before.mode is Mode.ARMING and edge.was_closed)
-
-
-def _reacts(edge: TickEdge) -> bool:
-    """The mode reacts by the hardest of all present faults, in the tick in which it is detected."""
-    if edge.after.mode is Mode.ARMING:
-        return edge.reaction < Reaction.SOFT_STOP
-    return edge.after.mode not in ENERGISED or HARDNESS[edge.after.mode] >= MILDEST[edge.reaction]
-
-
-def _disarms(edge: TickEdge) -> bool:
-    ended = edge.before.mode in ENERGISED and edge.after.mode not in ENERGISED
-    if edge.before.pending is Request.DISARM and edge.after.mode in ENERGISED:
-        return False
-    return not ended or (edge.asked_idle and not edge.after.obedient.closed)
-
-
-def _stops(edge: TickEdge) -> bool:
-    asked = (edge.before.mode, edge.before.pending) == (Mode.WALKING, Request.STOP)
-    return not asked or edge.after.mode in (Mode.STOPPING, Mode.DAMPING, Mode.FAULT)
-
-
-def _stays_stopped(edge: TickEdge) -> bool:
-    return edge.before.mode is not Mode.STOPPING or edge.after.mode is not Mode.WALKING
-
-
-def _ends_with_its_operator(edge: TickEdge) -> bool:
-    return not edge.debts.abandoned or edge.after.mode not in (Mode.ARMING, Mode.HOLD, Mode.WALKING)
-
-
-def _moves_in_hold(edge: TickEdge) -> bool:
-    return not edge.after.moving or (edge.after.mode is Mode.HOLD and edge.reaction < Reaction.HOLD)
-
-
-def _ends_fault_without_fault(edge: TickEdge) -> bool:
-    left = edge.before.mode is Mode.FAULT and edge.after.mode is not Mode.FAULT
-    return not left or (edge.after.mode is Mode.IDLE and edge.reaction < Reaction.SOFT_STOP)
-
-
-TICK_PROMISES: dict[str, Callable[[TickEdge], bool]] = {
-    "torque goes on only by a request to arm": _arms_by_request,
-    "the robot arms with no fault that blocks arming or is not cleared": _arms_only_unblocked,
-    "a walk begins only by a request, without a fault that holds": _walks_by_request,
-    "a joint moves only when every drive has confirmed this arming": _moves_when_confirmed,
-    "a drive is asked for closed loop only while arming": lambda edge: (
-        not edge.asked_closed or edge.after.mode is Mode.ARMING
-    ),
-    "a drive is prepared before it is asked for closed loop": lambda edge: not edge.asked_unprepared,
-    "torque is commanded only in modes that may": lambda edge: not edge.torque or edge.after.mode in MOVING,
-    "the gate is open only while torque may be on": lambda edge: edge.gate_open == (edge.after.mode in ENERGISED),
-    "every detected fault is present": lambda edge: edge.found <= {each.kind for each in edge.after.faults},
-    "the hardest reaction counts at once": _reacts,
-    "disarm, and every end of torque, asks all drives to go idle at once": _disarms,
-    "a stop ends a walk at once": _stops,
-    "a stop does not turn into a walk": _stays_stopped,
-    "stopping and damping end in time": lambda edge: (
-        edge.after.mode_ticks <= LONGEST_TICKS.get(edge.after.mode, edge.after.mode_ticks)
-    ),
-    "motion ends when its operator is lost": _ends_with_its_operator,
-    "a move goes on only in hold and without a fault": _moves_in_hold,
-    "a fault ends in idle, once no fault is present that stops": _ends_fault_without_fault,
-    "force ends with the torque": lambda edge: not edge.after.forced or edge.after.mode in ENERGISED,
-    "a request is answered once": lambda edge: edge.after.pending is Request.NONE,
-}
-
-
-def _is_permitted(edge: CallEdge) -> bool:
-    """Return whether the call respects the lease: only the holder of a lease that is not lost moves the robot."""
-    if not edge.accepted or edge.call.method not in ("arm", "walk", "move"):
-        return True
-    lease, caller = edge.before.lease, edge.call.operator
+def _kept_by_call(edge: CallEdge) -> dict[str, bool]:
+    before, after, method, caller = edge.before, edge.after, edge.call.method, edge.call.operator
+    lease, moves = before.lease, edge.accepted and method in ("arm", "walk", "move")
     in_time = not lease.lost and lease.remaining_s >= CALL_S - NOW_S
     free = lease.holder is None or (in_time and (lease.holder is caller or edge.call.takes_over))
-    return free and caller not in edge.debts.ousted
-
-
-def _is_pending(edge: CallEdge) -> bool:
-    if edge.before.pending is Request.DISARM:
-        return edge.after.pending is Request.DISARM
-    if edge.call.method in ("stop", "disarm"):
-        return edge.after.pending is Request[edge.call.method.upper()]
-    return edge.accepted or edge.after.pending is edge.before.pending
+    if before.pending is Request.DISARM:
+        replaced_well = after.pending is Request.DISARM
+    elif method in ("stop", "disarm"):
+        replaced_well = after.pending is Request[method.upper()]
+    else:
+        replaced_well = edge.accepted or after.pending is before.pending
+    return {
+        "stop and disarm are never refused": edge.accepted or method not in ("stop", "disarm"),
+        "only the holder of the lease moves the robot": not moves or free and caller not in edge.debts.ousted,
+        "disarm is not replaced, and no refused call replaces anything": replaced_well,
+        "a stop ends a move": method != "stop" or not after.moving,
+        "nothing arms or walks while the daemon ends": (
+            not (before.ending and edge.accepted and method in ("arm", "walk"))
+        ),
+        "a lost lease stays lost while torque is on": (
+            not (lease.lost and before.mode in ENERGISED) or after.lease.lost or _is_own_release(edge)
+        ),
+    }
 
 
 def _is_own_release(edge: CallEdge) -> bool:
     return edge.call.method == "release" and edge.before.lease.holder is edge.call.operator
 
 
-CALL_PROMISES: dict[str, Callable[[CallEdge], bool]] = {
-    "stop and disarm are never refused": lambda edge: edge.accepted or edge.call.method not in ("stop", "disarm"),
-    "only the holder of the lease moves the robot": _is_permitted,
-    "disarm is not replaced, and no refused call replaces anything": _is_pending,
-    "a stop ends a move": lambda edge: edge.call.method != "stop" or not edge.after.moving,
-    "nothing arms or walks while the daemon ends": lambda edge: (
-        not (edge.before.ending and edge.accepted and edge.call.method in ("arm", "walk"))
-    ),
-    "a lost lease stays lost while torque is on": lambda edge: (
-        not (edge.before.lease.lost and edge.before.mode in ENERGISED) or edge.after.lease.lost or _is_own_release(edge)
-    ),
-}
-
-
 def broken_by_tick(edge: TickEdge) -> list[str]:
-    return [text for text, kept in TICK_PROMISES.items() if not kept(edge)]
+    kept = _kept_in_arming(edge) | _kept_in_motion(edge)
+    return [text for text, is_kept in kept.items() if not is_kept]
 
 
 def broken_by_call(edge: CallEdge) -> list[str]:
-    return [text for text, kept in CALL_PROMISES.items() if not kept(edge)]
+    return [text for text, is_kept in _kept_by_call(edge).items() if not is_kept]
 
 
 def is_home(memory: Memory) -> bool:
