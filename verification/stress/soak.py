@@ -85,8 +85,8 @@ class PatientRecorder(Recorder):
         return super().report()._replace(slowest_write_s=0.0)
 
 
-class SoakedLoop:
-    """Owns robot, socket and recorder, the operator's visits, and the counts. A seed always gives the same calls."""
+class SoakedRobot(Lockstep):
+    """Owns socket and recorder, the operator's visits, and the counts. A seed always gives the same calls."""
 
     def __init__(self, folder: Path, seed: int) -> None:
         configuration = replace(load_example(), log=LOG)
@@ -96,12 +96,12 @@ class SoakedLoop:
         metadata = {"robot": "soak", "run_id": run}
         self.recorder = PatientRecorder(first_path(self.logs, run), configuration.text, metadata, LOG)
         failures = Failures(configuration.bus, seed)
-        self._failures = [(name, str(kind)) for name, kind, _ in failures.table() if name != UNHARMED]
-        self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
-        calls = OperatorCalls(self.robot.loop, [], self._now_s)
+        super().__init__(configuration, self._track(), seed, self.recorder, failures=failures)
+        self._harms = [(name, str(kind)) for name, kind, _ in failures.table() if name != UNHARMED]
+        calls = OperatorCalls(self.loop, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
         self.socket.methods = with_failures(
-            calls.methods, failures, self.robot.loop.events.report, self._now_s, calls.require_own_robot
+            calls.methods, failures, self.loop.events.report, self._now_s, calls.require_own_robot
         )
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
@@ -109,10 +109,6 @@ class SoakedLoop:
         self.asked: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self.mode_ticks: Counter[str] = Counter()
-        self.ticks = 0
-
-    def _now_s(self) -> float:
-        return self.robot.now_s
 
     def _track(self) -> Track:
         waters = [self.chance.uniform(DRIEST_PERCENT + 1.0, WETTEST_PERCENT - 1.0) for _ in range(SEGMENTS)]
@@ -120,22 +116,20 @@ class SoakedLoop:
         track.clay_at(SEGMENTS * SEGMENT_M)  # drawn as far as this, so that it does not grow on the way
         return track
 
-    def run_for(self, seconds: float) -> None:
+    def run_for(self, duration_s: float) -> None:
         """Run with operator and failures, and then until no client is connected."""
-        for _ in range(round(seconds * RATE_HZ)):
-            self._step()
+        for _ in range(round(duration_s * RATE_HZ)):
+            self.step()
             self._invite()
         while self.visitors or self.socket.counters["clients"]:
-            self._step()
+            self.step()
 
-    def _step(self) -> None:
-        loop = self.robot.loop
-        self.robot.step()
-        self.socket.serve(self.robot.now_s)
-        self.ticks += 1
-        self.mode_ticks[loop.mode.name.lower()] += 1
-        self.faults.update(fault.name for fault in loop.faults.begun)
-        for visitor in [each for each in self.visitors if self.ticks >= each.last_tick]:
+    def step(self) -> None:
+        super().step()
+        self.socket.serve(self.now_s)
+        self.mode_ticks[self.loop.mode.name.lower()] += 1
+        self.faults.update(fault.name for fault in self.loop.faults.begun)
+        for visitor in [each for each in self.visitors if self.tick_number >= each.last_tick]:
             with suppress(BlockingIOError):
                 if visitor.reads:
                     visitor.connection.recv(1 << 20)
@@ -144,14 +138,14 @@ class SoakedLoop:
 
     def _invite(self) -> None:
         """Let the operator and failures come at their times, and reset joints that a fault moved out of range."""
-        loop = self.robot.loop
-        if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
-            for arm in self.robot.robot.plant.arms:
+        present = self.loop.faults.present
+        if self.tick_number % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in present):
+            for arm in self.robot.plant.arms:
                 arm.reset()
-        if self.ticks % CALL_TICKS == 0:
-            self._visit(self._next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
+        if self.tick_number % CALL_TICKS == 0:
+            self._visit(self._next_call(self.loop.mode.name.lower(), bool(self.loop.faults.blocking())))
         if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
-            component, kind = self.chance.choice(self._failures)
+            component, kind = self.chance.choice(self._harms)
             for_s = round(self.chance.choice((0.02, 0.1, 0.5, 1.0)) * self.chance.uniform(0.5, 1.5), 3)
             self._visit(("fail", {"component": component, "kind": kind, "for_s": for_s}))
 
@@ -179,14 +173,14 @@ class SoakedLoop:
         connection.connect(str(self.socket.path))
         connection.setblocking(False)
         connection.sendall(b"".join(msgpack.packb([0, number, *each]) for number, each in enumerate(calls)))
-        last_tick, reads = self.ticks + self.chance.choice(STAY_TICKS), self.chance.random() >= SILENT_FRACTION
+        last_tick, reads = self.tick_number + self.chance.choice(STAY_TICKS), self.chance.random() >= SILENT_FRACTION
         self.visitors.append(Visitor(connection, last_tick, reads))
         self.asked.update(method for method, _ in calls)
 
     def reading(self) -> dict[str, float]:
         writer = self.recorder.writer_pid
         return {
-            "at_s": round(self.robot.now_s, 1),
+            "at_s": round(self.now_s, 1),
             "resident_kib": resident_kib(),
             "descriptors": descriptors(),
             "threads": threads(),
@@ -196,11 +190,10 @@ class SoakedLoop:
         }
 
     def report(self) -> dict[str, Any]:
-        loop = self.robot.loop
         return {
-            "simulated_s": round(self.robot.now_s, 1),
-            "strides": loop.learning.strides_closed,
-            "walked_m": round(self.robot.robot.plant.body_m, 2),
+            "simulated_s": round(self.now_s, 1),
+            "strides": self.loop.learning.strides_closed,
+            "walked_m": round(self.robot.plant.body_m, 2),
             "asked": dict(self.asked),
             "faults": dict(self.faults),
             "modes_s": {mode: round(ticks / RATE_HZ, 1) for mode, ticks in self.mode_ticks.items()},
@@ -210,7 +203,7 @@ class SoakedLoop:
 
 
 def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
-    soaked, readings = SoakedLoop(folder, seed), []
+    soaked, readings = SoakedRobot(folder, seed), []
     try:
         freeze_garbage()
         for number in range(READINGS):
@@ -218,7 +211,7 @@ def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
             soaked.run_for(seconds / READINGS)
             readings.append(soaked.reading())
         report = soaked.report() | {"garbage": count_garbage(), "readings": readings}
-        if soaked.robot.loop.mode is Mode.BOOT:
+        if soaked.loop.mode is Mode.BOOT:
             raise RuntimeError("the drives were never heard")
     finally:
         soaked.socket.close()
