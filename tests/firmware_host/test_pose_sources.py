@@ -75,11 +75,9 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
         (NATNET + 'socket = "/s"\n[pose.natnet]\nversion = "4.1"', "pose.socket = '/s': must be left out where"),
         ('axis = "w"', "pose.axis = 'w': must be x, y or z"),
         ("axis = [0, 0, 0]", "pose.axis = [0, 0, 0]: must be x, y or z"),
-        ("axis = [1, 0]", "pose.axis = [1, 0]: must be"),
         ("axis = [true, 0, 0]", "pose.axis = [True, 0, 0]: must be"),
         ("axis = [inf, 0, 0]", "pose.axis = [inf, 0, 0]: must be"),
         ("axis = 1979-05-27", "pose.axis = datetime.date(1979, 5, 27): must be"),
-        ("origin_m = nan", "pose.origin_m = nan: "),
         (NATNET, "pose.natnet.version = '': must be given where no pose.natnet.server can be asked for it"),
         (TABLE + 'group = ""\nversion = "4.1"', "pose.natnet.server = '': must be given where"),
         (TABLE + 'server = "motive.lab"', "pose.natnet.server = 'motive.lab': must be an address"),
@@ -92,14 +90,8 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
             "pose.natnet.body_id = 3: must be left out",
         ),
         (TABLE + 'version = "4.1"\ninterface = "a/b"', "pose.natnet.interface = 'a/b': must be a name"),
-        (TABLE + 'version = "4.1"\nport = 0', "pose.natnet.port = 0: must be at least 1"),
         (ENCODER + "metres_per_count = 0.001", "pose.rail_encoder.device = '': must name a serial port"),
         (ENCODER + 'device = "/dev/ttyACM0"', "pose.rail_encoder.metres_per_count = 0.0: must be given, and not 0"),
-        (
-            ENCODER + 'device = "a"\nmetres_per_count = 2.0',
-            "pose.rail_encoder.metres_per_count = 2.0: must be at most 1.0",
-        ),
-        (ENCODER + "baud = 9600", "pose.rail_encoder.baud: there is no such key"),
     ],
 )
 def test_invalid_pose_sections_are_refused_with_key_and_value(example_text: str, section: str, reported: str) -> None:
