@@ -214,12 +214,6 @@ def test_a_watchdog_that_is_unknown_off_or_slow_is_a_fault(bench: Bench, watchdo
     assert bench.tick() == []
 
 
-def test_a_duplicate_node_id_is_reported_while_it_lasts(bench: Bench) -> None:
-    bench.drives.report(1, duplicate_id=True)
-    for _ in range(3):
-        assert reported(bench.tick()) == [("duplicate_node_id", "left_adduction")]
-
-
 # pose
 
 

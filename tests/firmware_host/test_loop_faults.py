@@ -25,7 +25,6 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from simulation.devices.drive import DriveError
 from simulation.devices.odrive.device import SimulatedOdrive
-from simulation.harness.drive_presets import with_drive_type
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -329,16 +328,6 @@ def test_a_robot_that_is_not_calibrated_is_armed_only_with_a_waiver(example_text
     assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated") is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
     assert robot.loop.forced and "uncalibrated" in {fault.name for fault in robot.loop.faults.present}
-
-
-def test_two_checks_are_overruled_by_name(example_text: str) -> None:
-    """As those of motors that report no watchdog and are not calibrated."""
-    robot = Robot(parse_configuration(with_drive_type(example_text, "mit:AK80-9")))
-    robot.run_for(1.5)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated") is not None
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated,watchdog_unknown") is None
-    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
 
 
 @pytest.mark.parametrize("name", ["drive_silent", "everything", "disk_low"])
