@@ -41,10 +41,10 @@ def reported(
 
 
 def choose_now(
-    adaptation: Adaptation, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+    adaptation: Adaptation, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float | None = None
 ) -> DepthChoice:
-    """Run all units of a choice at once."""
-    return finish(adaptation.choose(mud_estimate, strides, walked_m))
+    """Run all units of a choice at once, after a stride at `walked_m` or at the depth of the choice before."""
+    return finish(adaptation.choose(mud_estimate, strides, adaptation.choice.depth_m if walked_m is None else walked_m))
 
 
 def bound(value: float, depth_m: float = 0.03) -> Coefficient:

@@ -46,28 +46,23 @@ GOOD_TICKS = round(GOOD_S / PERIOD_S)
 FOR_EVER, A_WHILE = 1001, GOOD_TICKS + 1
 
 
-@pytest.mark.parametrize("fault", [LATE, HOT, QUIET, SILENT, BUG])
-def test_where_torque_was_off_a_fault_ends_with_its_cause(fault: Fault) -> None:
-    assert ticks_standing(fault, False, False) == A_WHILE
-
-
 @pytest.mark.parametrize(
-    ("fault", "energised_after", "expected"),
+    ("fault", "energised", "energised_after", "expected"),
     [
-        (LATE, True, A_WHILE),  # a warning
-        (STALE, True, A_WHILE),  # it only holds
-        (HOT, True, FOR_EVER),  # a soft stop goes to its end
-        (QUIET, True, FOR_EVER),
-        (HOT, False, A_WHILE),
-        (QUIET, False, A_WHILE),
-        (SILENT, True, FOR_EVER),
-        (SILENT, False, FOR_EVER),
-        (BUG, True, FOR_EVER),
-        (BUG, False, FOR_EVER),
+        *((fault, False, False, A_WHILE) for fault in (LATE, HOT, QUIET, SILENT, BUG)),  # where torque was off
+        (LATE, True, True, A_WHILE),  # a warning
+        (STALE, True, True, A_WHILE),  # it only holds
+        (HOT, True, True, FOR_EVER),  # a soft stop goes to its end
+        (QUIET, True, True, FOR_EVER),
+        (HOT, True, False, A_WHILE),
+        (QUIET, True, False, A_WHILE),
+        *((fault, True, after, FOR_EVER) for fault in (SILENT, BUG) for after in (False, True)),
     ],
 )
-def test_where_torque_was_on_it_stands_by_its_kind(fault: Fault, energised_after: bool, expected: int) -> None:
-    assert ticks_standing(fault, True, energised_after) == expected
+def test_a_fault_ends_with_its_cause_and_where_torque_was_on_by_its_kind(
+    fault: Fault, energised: bool, energised_after: bool, expected: int
+) -> None:
+    assert ticks_standing(fault, energised, energised_after) == expected
 
 
 def test_the_message_is_that_of_the_last_time_and_the_event_that_of_the_first() -> None:
@@ -80,22 +75,11 @@ def test_the_message_is_that_of_the_last_time_and_the_event_that_of_the_first() 
 
 def test_the_worst_is_the_hardest_and_of_equals_the_first() -> None:
     latch = FaultLatch()
-    latch.update([LATE], True)
-    assert latch.worst == LATE
-    latch.update([HOT], True)
-    latch.update([QUIET, SILENT], True)
-    latch.update([fault_of("drive_silent", "right_sweep")], True)
-    assert (latch.worst, latch.reaction) == (SILENT, Reaction.DRIVES_IDLE)
-
-
-def test_without_a_fault_there_is_no_reaction() -> None:
-    latch = FaultLatch()
     latch.update([], True)
     assert (latch.worst, latch.reaction, latch.blocking()) == (None, Reaction.NONE, [])
-    latch.update([LATE], False)
-    for _ in range(A_WHILE):
-        latch.update([], False)
-    assert (latch.worst, latch.reaction) == (None, Reaction.NONE)
+    for faults, worst in (([LATE], LATE), ([HOT], HOT), ([QUIET, SILENT], SILENT), ([ALL[-1]], SILENT)):
+        latch.update(faults, True)
+        assert latch.worst == worst
 
 
 def test_force_overrules_what_may_be_overruled() -> None:

@@ -70,11 +70,13 @@ def test_the_torque_limit_cuts_exactly_at_its_bound() -> None:
 
 
 @given(finite_limits, st.floats(allow_nan=False), st.floats(-1.0, 1.0), states, st.floats(0.0, 0.1))
-def test_limits_never_let_more_than_the_torque_limit_out(
+def test_limits_let_out_no_more_than_the_torque_limit_and_no_more_than_the_slew_rate(
     limits: JointLimits, wanted: float, fraction: float, joint: DriveState, dt: float
 ) -> None:
-    torque = limited_torque_nm(wanted, fraction * limits.torque_nm, joint, limits, SPAN, dt)
+    previous = fraction * limits.torque_nm
+    torque = limited_torque_nm(wanted, previous, joint, limits, SPAN, dt)
     assert abs(torque) <= limits.torque_nm * (1.0 + ROUNDING)
+    assert abs(torque - previous) <= limits.torque_rate_nm_s * dt * (1.0 + ROUNDING) + 1e-15 * limits.torque_nm
 
 
 # slew rate
@@ -87,15 +89,6 @@ def test_the_slew_rate_binds_exactly_one_step_from_the_previous_torque() -> None
             torque = limited_torque_nm(wanted, float(previous), state(), LIMITS, SPAN, PERIOD_S)
             expected = min(max(wanted, previous - SLEW_NM), previous + SLEW_NM)
             assert torque == pytest.approx(expected, abs=ROUNDING)
-
-
-@given(finite_limits, st.floats(allow_nan=False), st.floats(-1.0, 1.0), states, st.floats(0.0, 0.1))
-def test_limits_never_exceed_the_slew_rate(
-    limits: JointLimits, wanted: float, fraction: float, joint: DriveState, dt: float
-) -> None:
-    previous = fraction * limits.torque_nm
-    torque = limited_torque_nm(wanted, previous, joint, limits, SPAN, dt)
-    assert abs(torque - previous) <= limits.torque_rate_nm_s * dt * (1.0 + ROUNDING) + 1e-15 * limits.torque_nm
 
 
 def test_full_torque_is_reached_after_its_ratio_to_the_slew_step() -> None:
@@ -153,13 +146,10 @@ def test_torque_that_speeds_a_joint_up_fades_out_over_the_last_fifth_of_the_velo
         assert settled_nm(-side * 9.0, moving) == -side * 0.75
 
 
-def test_a_small_torque_is_not_scaled_but_capped_by_the_velocity_fade() -> None:
+def test_a_small_torque_is_not_scaled_but_capped_by_the_velocity_fade_which_has_no_step_at_its_ends() -> None:
     halfway = state(velocity_rad_s=0.9 * LIMITS.velocity_rad_s)
     assert settled_nm(0.3, halfway) == 0.3
     assert settled_nm(0.5, halfway) == pytest.approx(0.375)
-
-
-def test_the_velocity_fade_has_no_step_at_its_ends() -> None:
     for edge in (0.8 * LIMITS.velocity_rad_s, LIMITS.velocity_rad_s):
         below, above = (settled_nm(9.0, state(velocity_rad_s=nextafter(edge, to))) for to in (0.0, inf))
         assert below == pytest.approx(above, abs=1e-12)
@@ -173,24 +163,30 @@ def test_torque_derates_from_warm_to_nothing_when_hot() -> None:
     for temperature in np.linspace(0.0, 150.0, 3001):
         fraction = np.interp(temperature, [70.0, 90.0], [1.0, 0.0])
         warm = state(temperature_c=float(temperature))
-        assert settled_nm(9.0, warm) == pytest.approx(0.75 * fraction, abs=1e-12)
-        assert settled_nm(-9.0, warm) == pytest.approx(-0.75 * fraction, abs=1e-12)
-    assert settled_nm(9.0, state(temperature_c=90.0)) == 0.0
-    assert settled_nm(9.0, state(temperature_c=nextafter(90.0, 0.0))) > 0.0
-    assert settled_nm(9.0, state(temperature_c=70.0)) == 0.75
-    assert settled_nm(9.0, state(temperature_c=inf)) == 0.0
+        for side in (1.0, -1.0):
+            assert settled_nm(side * 9.0, warm) == pytest.approx(side * 0.75 * fraction, abs=1e-12)
 
 
-def test_a_drive_without_thermistor_counts_as_cool() -> None:
-    assert settled_nm(9.0, state(temperature_c=nan)) == 0.75
-    assert settled_nm(9.0, state(temperature_c=0.0)) == 0.75
-
-
-def test_warm_and_hot_at_one_temperature_switch_off_at_it() -> None:
-    limits = JointLimits(temperature_warm_c=80.0, temperature_hot_c=80.0)
-    for temperature, torque in ((nextafter(80.0, 0.0), 0.5), (80.0, 0.0), (nextafter(80.0, 90.0), 0.0), (81.0, 0.0)):
-        hot = state(temperature_c=temperature)
-        assert limited_torque_nm(0.5, 0.0, hot, limits, SPAN, 1.0) == torque
+@pytest.mark.parametrize(
+    ("warm_c", "hot_c", "temperature_c", "torque_nm"),
+    [
+        (70.0, 90.0, 70.0, 0.75),
+        (70.0, 90.0, 90.0, 0.0),
+        (70.0, 90.0, nextafter(90.0, 0.0), 5.33e-16),
+        (70.0, 90.0, inf, 0.0),
+        (70.0, 90.0, nan, 0.75),  # a drive without thermistor counts as cool
+        (80.0, 80.0, nextafter(80.0, 0.0), 0.75),  # both at one temperature: it switches off at it
+        (80.0, 80.0, 80.0, 0.0),
+        (80.0, 80.0, 81.0, 0.0),
+        (80.0, 80.5, 80.25, 0.375),  # less than a kelvin apart: it derates between them
+    ],
+)
+def test_torque_is_nothing_from_hot_on_and_whole_up_to_warm(
+    warm_c: float, hot_c: float, temperature_c: float, torque_nm: float
+) -> None:
+    limits = JointLimits(temperature_warm_c=warm_c, temperature_hot_c=hot_c)
+    limited_nm = limited_torque_nm(9.0, 0.0, state(temperature_c=temperature_c), limits, SPAN, 1.0)
+    assert limited_nm == pytest.approx(torque_nm, rel=0.01, abs=0.0)
 
 
 # defaults
@@ -215,30 +211,14 @@ def test_the_default_limits_are_those_of_the_robot() -> None:
     assert VELOCITY_FADE == 0.2
 
 
-def test_warm_and_hot_less_than_a_kelvin_apart_derate_between_them() -> None:
-    limits = JointLimits(temperature_warm_c=80.0, temperature_hot_c=80.5)
-    halfway = state(temperature_c=80.25)
-    assert limited_torque_nm(9.0, 0.0, halfway, limits, SPAN, 1.0) == pytest.approx(0.375)
-
-
 # not finite
 
 
 @pytest.mark.parametrize("joint", range(4))
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_one_torque_that_is_not_finite_turns_all_four_to_zero(joint: int, bad: float) -> None:
-    wanted = [0.1, 0.1, 0.1, 0.1]
-    wanted[joint] = bad
-    a, b, c, d = wanted
-    sent = apply_limits(Joints(a, b, c, d), Joints(0.7, -0.7, 0.7, -0.7), STILL, LIMITS, RANGES, PERIOD_S)
-    assert sent == LimitedTorques(NO_TORQUE, True, False)
-
-
-@pytest.mark.parametrize("joint", range(4))
-@pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_one_measurement_that_is_not_finite_turns_all_four_to_zero(joint: int, bad: float) -> None:
-    for unknown in (state(angle_rad=bad), state(velocity_rad_s=bad)):
-        assert limited_like(joint, 0.1, unknown) == LimitedTorques(NO_TORQUE, True, False)
+def test_one_torque_or_measurement_that_is_not_finite_turns_all_four_to_zero(joint: int, bad: float) -> None:
+    for wanted_nm, measured in ((bad, state()), (0.1, state(angle_rad=bad)), (0.1, state(velocity_rad_s=bad))):
+        assert limited_like(joint, wanted_nm, measured) == LimitedTorques(NO_TORQUE, True, False)
 
 
 @given(

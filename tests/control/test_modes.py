@@ -29,7 +29,6 @@ HEALTHS = [
     for fault, blocking in product(WORST, ((), (OF_REACTION[Reaction.NONE],)))
 ]
 EVERYTHING = list(product(Mode, Request, HEALTHS))
-REQUESTS = [request for request in Request if request is not Request.NONE]
 WELL = Health(drives_heard=True, closed_loop=True)
 
 

@@ -171,7 +171,7 @@ def test_the_closed_forms_are_exact(
 
 # the mechanics, derived
 
-ALPHA, BETA, LENGTH, DROP, U, S, AXIS = sympy.symbols("alpha beta l h u s H", real=True)
+ALPHA, BETA, LENGTH, DROP, U, S = sympy.symbols("alpha beta l h u s", real=True)
 ROTATION = sympy.Matrix([[1, 0, 0], [0, sympy.cos(BETA), -sympy.sin(BETA)], [0, sympy.sin(BETA), sympy.cos(BETA)]])
 POSITION = ROTATION * sympy.Matrix([(LENGTH + U) * sympy.sin(ALPHA), (LENGTH + U) * sympy.cos(ALPHA), S - DROP])
 NORMAL = POSITION.diff(U).cross(POSITION.diff(S))  # of two unit vectors in the plate
@@ -190,9 +190,6 @@ def test_a_load_along_the_normal_turns_the_joints_by_its_arm_and_by_its_drop_tim
     below_arm = DROP - S
     assert is_zero(NORMAL.dot(POSITION.diff(ALPHA)) - (LENGTH + U))
     assert is_zero(NORMAL.dot(POSITION.diff(BETA)) + below_arm * sympy.sin(ALPHA))
-
-
-WIDTH, NEAR, FAR, MIDDLE, Q = sympy.symbols("w D_1 D_2 m q", positive=True)
 
 
 @given(poses)
@@ -243,11 +240,6 @@ def test_a_plate_above_the_mud_is_dry(
     plate = submerged_plate(geometry, sweep, adduction, lowest_m + clearance_m + 1e-9)
     assert plate == DRY
     assert stance_moment_m4(geometry, plate) == stroke_moment_m4(geometry, plate, sweep) == 0.0
-
-
-def vanishes(value: float) -> bool:
-    """Return whether a value is so small that its powers round."""
-    return 0.0 < abs(value) < 1e-6
 
 
 GOLDEN = {  # sweep, adduction, surface: the integrals and the joints' moments, from before plates had other shapes

@@ -285,24 +285,6 @@ def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
     assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # in k_p only the jump adds to the error
 
 
-@pytest.mark.parametrize("mass", [WEIGHTLESS, HEAVY])
-@pytest.mark.parametrize("times", [2, 5])
-def test_a_sample_that_is_read_again_counts_once(times: int, mass: ArmMass) -> None:
-    samples = noisy(triggered(motion(), MUD, mass), 2, 0.05)
-    repeated = [
-        sample._replace(now_s=sample.now_s + again * PERIOD_S / times) for sample in samples for again in range(times)
-    ]
-    assert repr(one(repeated, estimator(mass))) == repr(one(samples, estimator(mass)))
-
-
-@pytest.mark.parametrize("field", ["sweep_rad", "adduction_rad", "sweep_current_a", "adduction_current_a"])
-@pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_samples_that_are_not_finite_are_skipped(field: str, bad: float) -> None:
-    samples, change = triggered(motion(), MUD), cast(dict[str, Any], {field: bad})
-    between = [each for sample in samples for each in (sample, sample._replace(**change))]
-    assert repr(one(between)) == repr(one(samples))
-
-
 def test_the_law_is_found_from_every_other_sample() -> None:
     samples = motion()
     start = samples.index(first_below(samples, MUD.surface_m)) % 2
@@ -369,64 +351,4 @@ def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
     assert stride.released
 
 
-def waiting(samples: Sequence[Sample]) -> list[Sample]:
-    """Let the flipper stay where its extraction ended, for longer than the time that it has to come out."""
-    *_, end = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
-    held, out_s = samples[end], samples[end].now_s + 1.1 * GRACE_S
-    return [
-        held._replace(now_s=sample.now_s, phase=sample.phase) if i > end and sample.now_s < out_s else sample
-        for i, sample in enumerate(samples)
-    ]
-
-
-def recovered(samples: Sequence[Sample]) -> list[Sample]:
-    """Insert a second of recovery at ten times the current before the swing; at its end the flipper is up."""
-    swing = next(i for i, sample in enumerate(samples) if sample.phase is Phase.SWING)
-    held, ticks = samples[swing - 1], round(1.0 / PERIOD_S)
-    freed = [
-        held._replace(
-            now_s=held.now_s + tick * PERIOD_S,
-            phase=Phase.RECOVERY,
-            adduction_rad=held.adduction_rad * (1.0 - tick / ticks),
-            adduction_current_a=10.0 * held.adduction_current_a,
-        )
-        for tick in range(1, ticks + 1)
-    ]
-    after = [sample._replace(now_s=sample.now_s + 1.0) for sample in samples[swing:]]
-    return [*samples[:swing], *freed, *after]
-
-
-def test_a_pose_lost_where_a_stride_closes_leaves_two_steps_unknown() -> None:
-    samples = triggered(motion(strides=3), MUD)
-    times = [stride.t_end_s for stride in closed(samples)]
-    seen = [sample._replace(body_x_m=nan if sample.now_s == times[0] else sample.now_s) for sample in samples]
-    lost, after, good = closed(seen)
-    assert good.step_m == pytest.approx(times[2] - times[1])
-    assert not isfinite(lost.step_m)
-    assert not isfinite(after.step_m)
-
-
-def test_a_reset_forgets_the_stride_under_way_and_the_count() -> None:
-    samples = triggered(motion(strides=2), MUD)
-    moving = [sample._replace(body_x_m=sample.now_s) for sample in samples]
-    flipper = estimator()
-    closed(moving[: len(moving) * 2 // 3], flipper)
-    flipper.reset()
-    assert repr(closed(moving, flipper)) == repr(closed(moving))
-
-
 # both flippers
-
-
-def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
-    mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), EstimationParameters(method="paper"))
-    strides: list[StrideEstimate] = []
-    for a, b in zip(left, right, strict=True):
-        reading = mud.update(
-            a.now_s,
-            a.phase,
-            Joints(*states_of(a), *states_of(b)),
-            BodyPose(a.now_s, 0.0),
-        )
-        strides += reading.strides
-    return strides

@@ -87,9 +87,8 @@ SUBJECTS = (
     Subject(
         "control.monitors.joint_monitor",
         (
-            "control/monitors/test_joint_edges.py",
-            "control/monitors/test_joint_bounds.py",
             "control/monitors/test_joint_monitor.py",
+            "control/monitors/test_joint_silence.py",
         ),
         equivalent={
             "always in `if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:`": MORE_OFTEN,
@@ -99,7 +98,7 @@ SUBJECTS = (
     ),
     Subject(
         "control.monitors.encoder_monitor",
-        ("control/monitors/test_encoder_bounds.py", "control/monitors/test_encoder_monitor.py"),
+        ("control/monitors/test_encoder_monitor.py",),
         equivalent={
             "0.0 to 1.0 in `self, state: DriveState, dt_s: float, torque_nm: float=0.0`": "a torque that never changes",
             "without `self._reset_frozen()` in `def reset(self) -> None:`": "the first message does the same",
@@ -110,7 +109,7 @@ SUBJECTS = (
     ),
     Subject(
         "control.monitors.motion_monitor",
-        ("control/monitors/test_motion_bounds.py", "control/monitors/test_motion_monitor.py"),
+        ("control/monitors/test_motion_monitor.py",),
         equivalent={
             "Gt to GtE in `self._lag_rad > self._following_rad`": REPORTED,
             "LtE to Lt in `self.unexplained_j <= self._runaway_j`": REPORTED,

@@ -45,7 +45,7 @@ def chosen(
 ) -> DepthChoice:
     adaptation = adapted()
     adaptation.reset(commanded_m)
-    return choose_now(adaptation, mud_estimate, both() if strides is None else strides, adaptation.choice.depth_m)
+    return choose_now(adaptation, mud_estimate, both() if strides is None else strides)
 
 
 def duration_s(depth_m: float) -> float:
@@ -60,9 +60,9 @@ def predicted_m(thrust_n: float, k_s: float, depth_m: float) -> float:
     return step_m(GAIT, GEOMETRY, drag, Traction(thrust_n, 2.0 * MOTOR_FORCE_N, 2.0 * 250.0), depth_m)
 
 
-def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate], commanded_m: float = 0.03) -> DepthForecast:
+def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate]) -> DepthForecast:
     forecast = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
-    forecast.update(mud_estimate, strides, commanded_m)
+    forecast.update(mud_estimate, strides, 0.03)
     return forecast
 
 
@@ -86,28 +86,17 @@ exponents = st.floats(-1.0, 0.2)
 
 class TestTheFastestDepth:
     @given(shears, suctions, exponents, exponents, synthetic_strides)
-    def test_it_predicts_the_highest_speed_of_all_that_come_out(
+    def test_it_predicts_the_highest_speed_of_all_that_come_out_and_whether_that_one_slips(
         self, k_s: float, k_e: float, m_s: float, m_e: float, strides: list[StrideEstimate]
     ) -> None:
         mud_estimate = estimated(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
-        known = forecast(mud_estimate, strides)
-        out = {z: step / duration_s(z) for z, step in steps_m(known).items() if known.extraction_nm(z) < ALLOWED_NM}
+        known, choice = forecast(mud_estimate, strides), chosen(mud_estimate, strides)
+        steps = {round(z, 6): step for z, step in steps_m(known).items()}
+        out = {z: steps[z] / duration_s(z) for z in steps if known.extraction_nm(z) < ALLOWED_NM}
+        taken_m = round(choice.depth_m, 6)
+        assert choice.slips == (steps[taken_m] < 0.06) or abs(steps[taken_m] - 0.06) < 1e-9
         assume(out and max(out.values()) > 0.0)
-        choice = chosen(mud_estimate, strides)
-        best_m = max(out, key=lambda depth_m: out[depth_m])
-        assert choice.depth_m == same_depth(best_m) or out[best_m] == pytest.approx(
-            next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
-        )
-
-    @given(shears, suctions, synthetic_strides)
-    def test_it_slips_by_what_is_predicted_of_the_chosen_depth(
-        self, k_s: float, k_e: float, strides: list[StrideEstimate]
-    ) -> None:
-        mud_estimate = estimated(reported(k_s), reported(k_e))
-        choice, steps = chosen(mud_estimate, strides), steps_m(forecast(mud_estimate, strides))
-        predicted = next(step for z, step in steps.items() if abs(z - choice.depth_m) < 1e-9)
-        assume(abs(predicted - 0.06) > 1e-9)
-        assert choice.slips == (predicted < 0.06)
+        assert out[taken_m] == pytest.approx(max(out.values()))
 
     def test_firm_mud_is_walked_shallow_and_soft_mud_deep(self) -> None:
         firm, soft = chosen(estimated(FIRM, LOOSE)), chosen(estimated(SOFT, LOOSE))
@@ -115,29 +104,38 @@ class TestTheFastestDepth:
         assert not firm.slips and not soft.slips
         assert firm.reason == soft.reason == "fastest"
 
-    def test_where_nothing_comes_out_the_shallowest_is_taken(self) -> None:
-        soft, firm = chosen(estimated(SOFT, reported(20e6))), chosen(estimated(reported(1.5e6), reported(20e6)))
-        assert soft == DepthChoice(0.015, True, "extraction")
-        assert firm.depth_m == 0.015
-
-    @pytest.mark.parametrize(("k_e", "expected_m"), [(LOOSE, 0.05), (reported(1.5e6), 0.035)])
-    def test_where_no_depth_predicts_a_step_the_deepest_that_comes_out_is_taken(
-        self, k_e: Coefficient, expected_m: float
+    @pytest.mark.parametrize(
+        ("k_s", "k_e", "reached_m", "expected_m", "reason"),
+        [
+            (SOFT, reported(20e6), 0.03, 0.015, "extraction"),  # nothing comes out: the shallowest
+            (reported(1.5e6), reported(20e6), 0.03, 0.015, "extraction"),
+            (BOTTOMLESS, LOOSE, nan, 0.05, "thrust"),  # no depth predicts a step: the deepest that comes out
+            (BOTTOMLESS, reported(1.5e6), nan, 0.035, "thrust"),
+        ],
+    )
+    def test_where_no_depth_is_walked_it_slips_at_the_shallowest_or_at_the_deepest_that_comes_out(
+        self, k_s: Coefficient, k_e: Coefficient, reached_m: float, expected_m: float, reason: str
     ) -> None:
-        assert k_e.value * lift_m4(expected_m) < ALLOWED_NM
-        assert expected_m == 0.05 or k_e.value * lift_m4(expected_m + GRID_M) >= ALLOWED_NM
-        assert chosen(estimated(BOTTOMLESS, k_e), both(nan))[:3] == (same_depth(expected_m), True, "thrust")
+        choice = chosen(estimated(k_s, k_e), both(reached_m))
+        assert (choice.depth_m, choice.reason) == (same_depth(expected_m), reason)
+        assert choice.slips or k_s.value > SOFT.value
+        if reason == "thrust":
+            assert k_e.value * lift_m4(expected_m) < ALLOWED_NM
+            assert expected_m == 0.05 or k_e.value * lift_m4(expected_m + GRID_M) >= ALLOWED_NM
 
-    def test_a_heavier_body_or_more_drag_is_carried_deeper(self) -> None:
-        """The mud is soft enough that its yield, not the motors, limits the thrust of the plain robot."""
-        plain = chosen(estimated(SOFT, LOOSE)).depth_m
-        for burden in (
+    @pytest.mark.parametrize(
+        "burden",
+        [
             AdaptationParameters(body_drag_n=6.0),
             AdaptationParameters(body_mass_kg=2.5),
             AdaptationParameters(body_damping_n_s_m=20.0),
             AdaptationParameters(pad_width_m=0.1),
-        ):
-            assert choose_now(adapted(burden), estimated(SOFT, LOOSE), both(), 0.03).depth_m > plain
+        ],
+    )
+    def test_a_heavier_body_or_more_drag_is_carried_deeper(self, burden: AdaptationParameters) -> None:
+        """The mud is soft enough that its yield, not the motors, limits the thrust of the plain robot."""
+        mud = estimated(SOFT, LOOSE)
+        assert choose_now(adapted(burden), mud, both()).depth_m > chosen(mud).depth_m
 
     def test_a_surface_that_lies_deeper_needs_a_deeper_stride(self) -> None:
         level, sunk = (chosen(estimated(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
@@ -145,22 +143,22 @@ class TestTheFastestDepth:
 
 
 class TestUnknownMud:
-    def test_without_an_estimate_of_the_thrust_the_depth_stays(self) -> None:
-        adaptation = adapted()
-        adaptation.reset(0.0375)
+    @pytest.mark.parametrize(
+        ("mud_estimate", "strides"),
+        [(estimated(None, STICKY), both()), (NOTHING_KNOWN, both()), (estimated(FIRM, LOOSE), [])],
+    )
+    def test_without_an_estimate_of_the_thrust_the_depth_stays(
+        self, mud_estimate: MudEstimate, strides: list[StrideEstimate]
+    ) -> None:
         kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
-        assert choose_now(adaptation, estimated(None, STICKY), both(), adaptation.choice.depth_m) == kept
-        assert choose_now(adaptation, NOTHING_KNOWN, both(), adaptation.choice.depth_m) == kept
-        assert choose_now(adaptation, estimated(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
+        assert chosen(mud_estimate, strides, 0.0375) == kept
 
-    def test_a_reset_starts_at_its_depth(self) -> None:
-        adaptation = adapted()
-        choose_now(adaptation, estimated(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
+    def test_a_walk_starts_at_the_configured_depth_and_a_reset_at_its_own(self) -> None:
+        adaptation = adapted(AdaptationParameters(initial_depth_m=0.04))
+        assert adaptation.choice.depth_m == 0.04
+        choose_now(adaptation, estimated(BOTTOMLESS, LOOSE), both())
         adaptation.reset(0.02)
         assert adaptation.choice == DepthChoice(0.02, False, "start")
-
-    def test_the_first_depth_is_the_configured_one(self) -> None:
-        assert adapted(AdaptationParameters(initial_depth_m=0.04)).choice.depth_m == 0.04
 
     def test_a_stride_of_which_nothing_is_known_is_survived(self) -> None:
         lost = stride(depth_m=nan, surface_m=nan)
@@ -202,31 +200,30 @@ class TestUncertainty:
         assert depths_m[0] < depths_m[-1]
 
 
-class TestStuck:
-    SINKING = estimated(reported(0.08e6), LOOSE)  # the deeper, the faster
+SINKING = estimated(reported(0.08e6), LOOSE)  # the deeper, the faster
 
-    @pytest.mark.parametrize("depth_m", [0.0225, 0.0325, 0.04, 0.05])
+
+class TestStuck:
+    @pytest.mark.parametrize("depth_m", [0.015, 0.0225, 0.0325, 0.04, 0.05])
     @pytest.mark.parametrize("k_s", [FIRM, SOFT, BOTTOMLESS, None])
-    def test_a_stuck_flipper_goes_shallower_than_where_it_stuck(self, depth_m: float, k_s: Coefficient | None) -> None:
+    def test_a_stuck_flipper_goes_shallower_than_where_it_stuck_down_to_the_shallowest(
+        self, depth_m: float, k_s: Coefficient | None
+    ) -> None:
         choice = chosen(estimated(k_s, reported(1.0)), both(depth_m, released=False), depth_m)
-        assert choice.depth_m < 0.95 * depth_m
+        assert choice.depth_m < 0.95 * depth_m or choice.depth_m == depth_m == 0.015
         assert choice.reason == "a flipper was stuck"
 
     @pytest.mark.parametrize("stuck", ["left", "right"])
-    def test_one_stuck_flipper_is_enough(self, stuck: str) -> None:
+    @pytest.mark.parametrize("mud_estimate", [SINKING, estimated(None, LOOSE)])
+    def test_one_stuck_flipper_is_enough_and_the_deepest_that_comes_out_is_taken(
+        self, mud_estimate: MudEstimate, stuck: str
+    ) -> None:
         strides = [stride(flipper, 0.04, released=flipper != stuck) for flipper in ("left", "right")]
-        assert chosen(self.SINKING, strides, 0.04).depth_m == same_depth(0.0375)
-
-    def test_without_any_thrust_known_it_takes_the_deepest_that_comes_out(self) -> None:
-        assert chosen(estimated(None, LOOSE), both(0.04, released=False), 0.04).depth_m == same_depth(0.0375)
-
-    def test_a_flipper_that_stuck_at_the_shallowest_depth_stays_there(self) -> None:
-        for k_s in (SOFT, None):
-            assert chosen(estimated(k_s), both(0.015, released=False)).depth_m == 0.015
+        assert chosen(mud_estimate, strides, 0.04).depth_m == same_depth(0.0375)
 
     @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
     def test_a_stride_stuck_at_an_unknown_depth_leads_to_the_shallowest(self, reached_m: float) -> None:
-        assert chosen(self.SINKING, both(reached_m, released=False)).depth_m == 0.015
+        assert chosen(SINKING, both(reached_m, released=False)).depth_m == 0.015
 
 
 class Clay(NamedTuple):
@@ -324,33 +321,23 @@ pairs = st.lists(strides, min_size=1, max_size=2)
 
 
 class TestRange:
-    @given(st.lists(st.tuples(mud_estimates, pairs), max_size=5))
+    @given(
+        st.floats(5.0, 45.0), st.floats(0.02, 0.2), st.lists(st.tuples(mud_estimates, pairs), min_size=1, max_size=4)
+    )
     def test_the_depth_stays_within_its_bounds_and_within_reach(
-        self, walk: list[tuple[MudEstimate, list[StrideEstimate]]]
+        self, sweep_deg: float, max_depth_m: float, walk: list[tuple[MudEstimate, list[StrideEstimate]]]
     ) -> None:
-        adaptation = adapted()
-        for mud_estimate, pair in walk:
-            choice = choose_now(adaptation, mud_estimate, pair, adaptation.choice.depth_m)
-            assert PARAMETERS.min_depth_m <= choice.depth_m <= PARAMETERS.max_depth_m
-            assert GEOMETRY.is_reachable(radians(GAIT.sweep_angle_deg), choice.depth_m)
-
-    @given(st.floats(5.0, 45.0), st.floats(0.02, 0.2), mud_estimates, pairs)
-    def test_a_greatest_depth_out_of_reach_is_never_chosen(
-        self, sweep_deg: float, max_depth_m: float, mud_estimate: MudEstimate, pair: list[StrideEstimate]
-    ) -> None:
-        gait, parameters = GaitParameters(sweep_angle_deg=sweep_deg), AdaptationParameters(max_depth_m=max_depth_m)
-        adaptation = DepthAdaptation(parameters, GEOMETRY, gait)
+        parameters = AdaptationParameters(max_depth_m=max_depth_m)
+        adaptation = DepthAdaptation(parameters, GEOMETRY, GaitParameters(sweep_angle_deg=sweep_deg))
         assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in adaptation._depths_m)
         adaptation.reset(parameters.min_depth_m)
-        assert (
-            parameters.min_depth_m
-            <= choose_now(adaptation, mud_estimate, pair, adaptation.choice.depth_m).depth_m
-            <= max_depth_m + 1e-9
-        )
+        for mud_estimate, pair in walk:
+            depth_m = choose_now(adaptation, mud_estimate, pair).depth_m
+            assert parameters.min_depth_m <= depth_m <= max_depth_m + 1e-9
 
     def test_a_least_depth_out_of_reach_raises_nothing(self) -> None:
         parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
-        assert choose_now(adapted(parameters), estimated(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
+        assert choose_now(adapted(parameters), estimated(FIRM, LOOSE), both()).depth_m == 0.15
 
     def test_the_grid_contains_both_ends_of_its_range(self) -> None:
         assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)

@@ -12,7 +12,6 @@ from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.depth.step_model import Traction, step_m
 from control.gait.gait import Gait, stride_duration_s
-from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
@@ -20,12 +19,9 @@ from control.parameters.joint_limits import JointLimits
 from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control import synthetic_muds
-from tests.control.synthetic_muds import both, choose_now
+from tests.control.synthetic_muds import GAIT, GEOMETRY, LIFTING_NM, both, choose_now
 
-GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
-LIFTING_NM = PARAMETERS.motor_force_n * GEOMETRY.flipper_length_m
-NOT_REPORTED = Estimate(nan, nan, 0, False, "not reported")
 
 
 def reported(value: float, at_least: bool = False) -> Coefficient:
@@ -59,7 +55,7 @@ def sweep_deg(choice: DepthChoice) -> float:
 def settled(mud_estimate: MudEstimate, count: int = 5) -> DepthChoice:
     adaptation = adapted()
     for _ in range(count):
-        choice = choose_now(adaptation, mud_estimate, strides(), adaptation.choice.depth_m)
+        choice = choose_now(adaptation, mud_estimate, strides())
     return choice
 
 
@@ -127,25 +123,16 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
         k_e = synthetic_muds.reported(fraction * just, 0.05 * fraction * just, depth_m=0.02)
         flipper = FlipperEstimate(None, reported(2e6), k_e)
-        choice = choose_now(
-            adaptation,
-            MudEstimate(None, reported(2e6), k_e, flipper, flipper),
-            strides(depth_m=nan),
-            adaptation.choice.depth_m,
-        )
+        choice = choose_now(adaptation, MudEstimate(None, reported(2e6), k_e, flipper, flipper), strides(depth_m=nan))
         assert (choice.reason == "fastest") is comes_out
 
 
-def test_firm_mud_is_walked_wide_and_shallow_and_soft_mud_narrow_and_deep() -> None:
+def test_firm_mud_is_walked_wide_and_shallow_and_soft_mud_narrow_and_deep_both_with_a_short_swing() -> None:
     firm, soft = settled(FIRM), settled(SOFT)
     assert sweep_deg(firm) > sweep_deg(soft)
     assert firm.depth_m < soft.depth_m
-
-
-def test_every_stride_has_the_short_swing_of_the_method() -> None:
-    choice = settled(FIRM)
-    assert choice.gait is not None
-    assert choice.gait == replace(GAIT, sweep_angle_deg=sweep_deg(choice), swing_duration_s=0.3)
+    for choice in (firm, soft):
+        assert choice.gait == replace(GAIT, sweep_angle_deg=sweep_deg(choice), swing_duration_s=0.3)
 
 
 def test_the_first_stride_is_walked_as_configured() -> None:
@@ -164,20 +151,25 @@ def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() ->
     assert widest_deg == 50.0
 
 
-@pytest.mark.parametrize("torque_nm", [0.7 * LIFTING_NM, nan])
-def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(torque_nm: float) -> None:
-    assert sweep_deg(choose_now(adapted(), FIRM, strides(torque_nm=torque_nm), 0.03)) == 30.0
-    assert sweep_deg(choose_now(adapted(), FIRM, strides(torque_nm=0.69 * LIFTING_NM), 0.03)) > 30.0
-
-
-def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
-    left, right = strides()[0], strides(torque_nm=0.6)[1]
-    assert sweep_deg(choose_now(adapted(), FIRM, [left, right], 0.03)) == 30.0
+@pytest.mark.parametrize(
+    ("left_nm", "right_nm", "wider"),
+    [
+        (0.69 * LIFTING_NM, 0.69 * LIFTING_NM, True),
+        (0.7 * LIFTING_NM, 0.7 * LIFTING_NM, False),
+        (nan, nan, False),  # not seen
+        (0.2, 0.8 * LIFTING_NM, False),  # one is enough
+    ],
+)
+def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(
+    left_nm: float, right_nm: float, wider: bool
+) -> None:
+    closed = [strides(torque_nm=left_nm)[0], strides(torque_nm=right_nm)[1]]
+    assert (sweep_deg(choose_now(adapted(), FIRM, closed)) > 30.0) is wider
 
 
 def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
     adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
-    choice = choose_now(adaptation, FIRM, strides(torque_nm=0.7), adaptation.choice.depth_m)
+    choice = choose_now(adaptation, FIRM, strides(torque_nm=0.7))
     assert (sweep_deg(choice), choice.reason) == (30.0, "fastest")
 
 
@@ -185,63 +177,51 @@ class TestStuck:
     def walked(self) -> tuple[GaitAdaptation, DepthChoice]:
         adaptation = adapted()
         for _ in range(4):
-            choice = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides())
         return adaptation, choice
 
     def test_nothing_as_deep_and_as_wide_is_tried_again_in_the_same_mud(self) -> None:
         adaptation, stuck = self.walked()
         for torque_nm in (0.2, 0.3, 0.2, 0.2):
-            choice = choose_now(
-                adaptation, FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m), adaptation.choice.depth_m
-            )
+            choice = choose_now(adaptation, FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m))
             assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
-    def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
-        adaptation, stuck = self.walked()
-        assert sweep_deg(stuck) == 50.0
-        assert sweep_deg(choose_now(adaptation, FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
-
-    def test_the_commanded_depth_is_excluded_where_the_flipper_was_pressed_deeper(self) -> None:
+    @pytest.mark.parametrize(("mud_estimate", "deeper_m"), [(FIRM, 0.0), (FIRM, 0.02), (NOTHING_KNOWN, 0.0)])
+    def test_the_commanded_depth_is_excluded_also_where_the_flipper_was_pressed_deeper(
+        self, mud_estimate: MudEstimate, deeper_m: float
+    ) -> None:
         """By the depth that the flipper reached, the commanded depth would be safe."""
         adaptation, stuck = self.walked()
-        choice = choose_now(adaptation, FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
+        assert sweep_deg(stuck) == 50.0
+        choice = choose_now(adaptation, mud_estimate, strides(released=False, depth_m=stuck.depth_m + deeper_m))
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
+        assert sweep_deg(choice) == 30.0
 
     def test_at_the_shallowest_and_narrowest_it_stays_until_it_comes_out_of_there(self) -> None:
         parameters = replace(PARAMETERS, initial_depth_m=0.015)
         adaptation = GaitAdaptation(parameters, GEOMETRY, GAIT)
         for _ in range(2):
-            choice = choose_now(adaptation, FIRM, strides(released=False, depth_m=0.03), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides(released=False, depth_m=0.03))
             assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "a flipper was stuck")
-        choice = choose_now(adaptation, FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
+        choice = choose_now(adaptation, FIRM, strides(depth_m=0.03))
         assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
     @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
     def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
         adaptation, stuck = self.walked()
-        choose_now(adaptation, FIRM, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m)
+        choose_now(adaptation, FIRM, strides(released=False, depth_m=stuck.depth_m))
         if forgotten == "another walk":
             adaptation.reset(0.03)
-        choose_now(adaptation, FIRM._replace(boundary=True), strides(), adaptation.choice.depth_m)
+        choose_now(adaptation, FIRM._replace(boundary=True), strides())
         for _ in range(4):
-            choice = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides())
         assert (choice.depth_m, choice.gait) == (stuck.depth_m, stuck.gait)
 
-    def test_with_no_thrust_known_it_goes_on_with_something_else(self) -> None:
-        adaptation, stuck = self.walked()
-        choice = choose_now(
-            adaptation, NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
-        )
-        assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
-
-def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
-    choice = choose_now(adapted(), estimated(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
+def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken_and_without_a_step_the_deepest() -> None:
+    choice = choose_now(adapted(), estimated(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01))
     assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
-
-
-def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
-    choice = choose_now(adapted(), estimated(0.005e6, 0.001e6), strides(), 0.03)
+    choice = choose_now(adapted(), estimated(0.005e6, 0.001e6), strides())
     assert (choice.reason, choice.slips) == ("thrust", True)
     assert choice.depth_m == pytest.approx(0.05)
 
@@ -251,9 +231,7 @@ def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
 def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
     adaptation = adapted()
     for i in range(4):
-        choice = choose_now(
-            adaptation, estimated(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m
-        )
+        choice = choose_now(adaptation, estimated(k_s, k_e), strides(released=bool(seed >> i & 1)))
         assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
         assert 30.0 <= sweep_deg(choice) <= 50.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import groupby, pairwise
 from math import copysign, cos, degrees, nan, radians, sin
 from typing import NamedTuple
@@ -135,6 +136,18 @@ def both_flippers(robot: SyntheticRobot) -> Sequence[str]:
     return BOTH
 
 
+@cache
+def held() -> SyntheticRobot:
+    """Return a robot whose flippers stayed in the mud in all attempts."""
+    return SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
+
+
+@cache
+def freed() -> SyntheticRobot:
+    """Return a robot whose flippers came out at the second attempt."""
+    return SyntheticRobot(until_attempt(2)).walk(9.0)
+
+
 def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float = 1.0) -> Hold:
     """Hold the flippers until that attempt has lasted `after_s`."""
 
@@ -147,22 +160,16 @@ def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float =
 # when there is a recovery
 
 
-def test_flippers_that_follow_are_never_recovered_and_walk_without_a_wait() -> None:
-    waiting, other = (
-        SyntheticRobot(no_flipper).walk(6.0),
-        SyntheticRobot(no_flipper, RecoveryParameters(attempts=0)).walk(6.0),
+def test_flippers_that_follow_are_never_recovered_and_without_attempts_the_gaits_clock_does_not_wait() -> None:
+    waiting, other, stuck = (
+        SyntheticRobot(hold, RecoveryParameters(attempts=attempts)).walk(6.0)
+        for hold, attempts in ((no_flipper, PARAMETERS.attempts), (no_flipper, 0), (both_flippers, 0))
     )
     assert Phase.RECOVERY not in waiting.phases
     assert waiting.moments == other.moments
     assert waiting.moments[-1].target.stride >= 2
-
-
-def test_with_no_attempts_the_gaits_clock_does_not_wait() -> None:
-    held = SyntheticRobot(both_flippers, RecoveryParameters(attempts=0)).walk(6.0)
-    free = SyntheticRobot(no_flipper).walk(6.0)
-    assert [moment.target for moment in held.moments] == [moment.target for moment in free.moments]
-    assert [moment.joints for moment in held.moments] == [moment.joints for moment in free.moments]
-    assert not held.recovery.given_up
+    assert [moment[:2] for moment in stuck.moments] == [moment[:2] for moment in waiting.moments]
+    assert not stuck.recovery.given_up
 
 
 @pytest.mark.parametrize("gait", PROTOCOLS.values())
@@ -196,12 +203,11 @@ def test_a_flipper_that_stays_in_is_given_up_after_the_last_attempt_in_bounded_t
 
 
 def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() -> None:
-    robot = SyntheticRobot(until_attempt(2)).walk(8.5)
-    assert robot.controller.fault is None
-    assert robot.phases[:6] == [
+    assert freed().controller.fault is None
+    assert freed().phases[:6] == [
         Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY, Phase.SWING, Phase.INSERTION,
     ]  # fmt: skip
-    assert robot.events == [
+    assert freed().events == [
         "both flippers are stuck, attempt 1 of 3",
         "both flippers are stuck, attempt 2 of 3",
         "the flippers came out after 2 attempts",
@@ -291,28 +297,21 @@ def test_both_flippers_rock_in_the_same_direction_from_both_sides_of_the_middle(
     assert targets[2].angle_rad == pytest.approx(right.angle_rad + lead_rad)
 
 
-def test_every_attempt_lifts_at_the_same_speed() -> None:
-    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
-    for attempt in (1, 2, 3):
-        speeds = [abs(moment.joints[index].velocity_rad_s) for moment in robot.in_attempt(attempt) for index in (1, 3)]
-        assert max(speeds) == pytest.approx(PARAMETERS.lift_rad_s)
-
-
-def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
-    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
-    for attempt in (1, 2, 3):
-        moments = robot.in_attempt(attempt)
-        for moment in moments[: round(PARAMETERS.pause_s / PERIOD_S) - 1]:
-            assert [joint.angle_rad for joint in moment.joints] == pytest.approx(moments[0].angles_rad)
-            assert all(joint.velocity_rad_s == 0.0 for joint in moment.joints)
-        assert moments[-1].joints[1].angle_rad > moments[0].angles_rad[1]
+@pytest.mark.parametrize("attempt", [1, 2, 3])
+def test_each_attempt_begins_with_a_pause_where_the_flippers_are_and_lifts_at_the_same_speed(attempt: int) -> None:
+    moments = held().in_attempt(attempt)
+    for moment in moments[: round(PARAMETERS.pause_s / PERIOD_S) - 1]:
+        assert [joint.angle_rad for joint in moment.joints] == pytest.approx(moments[0].angles_rad)
+        assert all(joint.velocity_rad_s == 0.0 for joint in moment.joints)
+    assert moments[-1].joints[1].angle_rad > moments[0].angles_rad[1]
+    speeds = [abs(moment.joints[index].velocity_rad_s) for moment in moments for index in (1, 3)]
+    assert max(speeds) == pytest.approx(PARAMETERS.lift_rad_s)
 
 
 def test_targets_lead_their_joints_by_no_more_than_the_lead() -> None:
-    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
     leads = [
         abs(joint.angle_rad - angle_rad)
-        for moment in robot.moments
+        for moment in held().moments
         if moment.attempt
         for joint, angle_rad in zip(moment.joints, moment.angles_rad, strict=True)
     ]
@@ -350,16 +349,12 @@ def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing
             assert abs(new.velocity_rad_s - old.velocity_rad_s) < 130.0 * PERIOD_S
 
 
-def test_the_swing_after_a_recovery_ends_where_every_swing_ends() -> None:
-    robot = SyntheticRobot(until_attempt(2)).walk(9.0)
-    first = next(moment for moment in robot.moments if moment.target.stride == 1)
+def test_the_swing_after_a_recovery_ends_where_every_swing_ends_and_is_soon_clear_of_the_mud() -> None:
+    first = next(moment for moment in freed().moments if moment.target.stride == 1)
     assert first.target.phase is Phase.INSERTION
-    assert first.joints == robot.controller._follow(first.target)
-
-
-def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
-    robot = SyntheticRobot(until_attempt(2)).walk(9.0)
-    swing = [moment for moment in robot.moments if moment.target.phase is Phase.SWING and moment.target.stride == 0]
+    assert first.joints == freed().controller._follow(first.target)
+    swing = [moment for moment in freed().moments if moment.target[:2] == (Phase.SWING, 0)]
+    assert swing
     for moment in swing[round(0.2 / PERIOD_S) :]:
         assert lowest_point_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
 

@@ -19,18 +19,6 @@ NOW_S = 1000.0
 LIMITS, BOUNDS, WINDING = JointLimits(), FaultBounds(), WindingParameters()
 CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A = 12.0, 0.083
 SPAN = JointRange(radians(-60.0), radians(60.0))
-HEALTHY = DriveState(
-    angle_rad=0.1,
-    velocity_rad_s=0.0,
-    angle_stamp_s=NOW_S,
-    current_a=0.0,
-    current_stamp_s=NOW_S,
-    closed_loop=True,
-    heartbeat_stamp_s=NOW_S,
-    temperature_c=25.0,
-    temperature_stamp_s=NOW_S,
-    bus_voltage_v=24.0,
-)
 
 
 def make_monitor(
@@ -38,6 +26,23 @@ def make_monitor(
 ) -> JointMonitor:
     drive = (WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
     return JointMonitor(JOINT, limits, SPAN, bounds, *drive, answers_only=answers_only)
+
+
+def healthy(now_s: float = NOW_S, **changes: Any) -> DriveState:
+    """Return the state of a drive that has just sent everything, with these changes."""
+    state = DriveState(
+        angle_rad=0.1,
+        velocity_rad_s=0.0,
+        angle_stamp_s=now_s,
+        current_a=0.0,
+        current_stamp_s=now_s,
+        closed_loop=True,
+        heartbeat_stamp_s=now_s,
+        temperature_c=25.0,
+        temperature_stamp_s=now_s,
+        bus_voltage_v=24.0,
+    )
+    return state._replace(**changes)
 
 
 def faults_of(
@@ -50,4 +55,10 @@ def faults_of(
 ) -> list[Fault]:
     """Return the faults that the monitor finds in one tick, with these changes of the loop's state."""
     facts = TickFacts(now_s, PERIOD_S, True, True, False)._replace(**changes)
-    return monitor.update(facts, state, torque_nm, target)
+    faults = monitor.update(facts, state, torque_nm, target)
+    assert all(fault.subject == JOINT for fault in faults)
+    return faults
+
+
+def names_of(monitor: JointMonitor, state: DriveState, now_s: float = NOW_S, **changes: Any) -> set[str]:
+    return {fault.name for fault in faults_of(monitor, state, now_s, **changes)}
