@@ -9,7 +9,7 @@ import json
 
 from control.records import BodyPose, Joints
 from estimation.mud import MudEstimator
-from tests.estimation.synthetic_walk import DRIVE, GEOMETRY, later, stride_samples
+from tests.estimation.synthetic_strides import DRIVE, GEOMETRY, stride_samples
 
 STRIDES = 4
 STRIDE_S = 20.0  # longer than a stride
@@ -21,7 +21,8 @@ def coefficient_digits() -> list[str]:
     digits = []
     for stride in range(STRIDES):
         left, right = (stride_samples(seed) for seed in (2 * stride, 2 * stride + 1))
-        for one, other in zip(later(left, stride * STRIDE_S), later(right, stride * STRIDE_S), strict=True):
+        for rows in zip(left, right, strict=True):
+            one, other = (row.later(stride * STRIDE_S) for row in rows)
             states = Joints(one.sweep, one.adduction, other.sweep, other.adduction)
             reading = mud.update(one.now_s, one.phase, states, BodyPose())
             digits += [repr(reading.strides)] if reading.strides else []

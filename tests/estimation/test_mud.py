@@ -22,30 +22,30 @@ from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import recorded_states
 from estimation.strokes.shear import Base
-from tests.estimation.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
-from tests.estimation.synthetic_walk import update as update_one
+from tests.estimation.synthetic_strides import DRIVE, GEOMETRY, K_P, WEIGHTLESS, Row, stride_samples
+from tests.estimation.synthetic_strides import update as update_one
 
 Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
 
 
-def walk(seed: int, strides: int = STRIDES) -> list[Sample]:
+def walk(seed: int, strides: int = STRIDES) -> list[Row]:
     """Return a walk whose last row, with which a swing begins, closes the last stride."""
     once = stride_samples(seed)
-    return [sample for stride in range(strides) for sample in later(once, PERIOD_OF_STRIDE_S * stride)]
+    return [row.later(PERIOD_OF_STRIDE_S * stride) for stride in range(strides) for row in once]
 
 
 def estimator(method: Method = "default") -> MudEstimator:
     return MudEstimator(GEOMETRY, (DRIVE, DRIVE), EstimationParameters(method=method, fixed_base=True))
 
 
-def update(mud: MudEstimator, left: Sample, right: Sample, body_x_m: float = 0.0) -> MudReading:
+def update(mud: MudEstimator, left: Row, right: Row, body_x_m: float = 0.0) -> MudReading:
     states = Joints(left.sweep, left.adduction, right.sweep, right.adduction)
     return mud.update(left.now_s, left.phase, states, BodyPose(left.now_s, body_x_m))
 
 
 def strides_of(
-    mud: MudEstimator, left: Sequence[Sample], right: Sequence[Sample], speed_m_s: float = 0.0
+    mud: MudEstimator, left: Sequence[Row], right: Sequence[Row], speed_m_s: float = 0.0
 ) -> list[StrideEstimate]:
     readings = [update(mud, a, b, speed_m_s * a.now_s) for a, b in zip(left, right, strict=True)]
     return [stride for reading in readings for stride in reading.strides]
@@ -103,8 +103,7 @@ def test_a_silent_flipper_does_not_disturb_the_other_one() -> None:
 
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
-    weightless = ArmMass(0.0, 0.0, 0.0, 0.0)
-    drives = (FlipperDrive(weightless, 0.05, 0.06), FlipperDrive(weightless, 0.07, 0.08))
+    drives = (FlipperDrive(WEIGHTLESS, 0.05, 0.06), FlipperDrive(WEIGHTLESS, 0.07, 0.08))
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method=method))
     states = recorded_states(0.0, (0.0,) * 4, (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
     reading = mud.update(0.0, Phase.REST, states, BodyPose(0.0, 0.0))

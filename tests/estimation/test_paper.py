@@ -1,42 +1,24 @@
 """The paper's method on strokes through synthetic mud that keeps the paper's laws: it recovers them, with the known
 bias of its trigger.
-
-Strides are compared by their text, since unknown values are NaN, which is not equal to itself.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache
-from math import cos, inf, isfinite, nan, radians, sin
-from typing import Any, NamedTuple, cast
+from math import cos, inf, nan, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from control.gait.gait import SINGLE_FLIPPER, Gait, stride_duration_s
-from control.geometry import FlipperGeometry
+from control.gait.gait import SINGLE_FLIPPER
 from control.parameters.arm_mass import ArmMass
-from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
-from control.records import (
-    BodyPose,
-    DriveState,
-    FlipperJoints,
-    FlipperLoad,
-    Joints,
-    Phase,
-    StrideEstimate,
-)
-from estimation.estimation_parameters import EstimationParameters
+from control.records import Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
-from estimation.mud import MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
-from estimation.stride_estimator import GRACE_S
-from tests.estimation.synthetic_walk import update
+from tests.estimation.synthetic_strides import GEOMETRY, WEIGHTLESS, Moment, Row, noisy, strides_of, update, walked
 
-GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
 SWEEP_NM_A, ADDUCTION_NM_A = 0.083, 0.09
-WEIGHTLESS = ArmMass(0.0, 0.0, 0.0, 0.0)
 HEAVY = ArmMass(0.3, 0.07, 0.0004, 0.0006)
 DRIVE = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, ADDUCTION_NM_A)
 EXACT = 1e-6
@@ -49,31 +31,15 @@ class Mud(NamedTuple):
     surface_m: float = 0.004
 
 
-class Sample(NamedTuple):
-    now_s: float
-    phase: Phase
-    sweep_rad: float
-    adduction_rad: float
-    sweep_velocity_rad_s: float
-    adduction_velocity_rad_s: float
-    sweep_current_a: float
-    adduction_current_a: float
-    body_x_m: float = 0.0
-
-    @property
-    def depth_m(self) -> float:
-        return GEOMETRY.depth_m(self.sweep_rad, self.adduction_rad)
-
-
 Force = tuple[float, float]  # forward and up, N
-Law = Callable[[Sample], Force]
+Law = Callable[[Moment], Force]
 MUD = Mud()
 
 
 def law_of(mud: Mud) -> Law:
     """Return the paper's three laws below the mud's surface."""
 
-    def force_n(sample: Sample) -> Force:
+    def force_n(sample: Moment) -> Force:
         submerged_m = max(0.0, sample.depth_m - mud.surface_m)
         if sample.phase is Phase.INSERTION:
             return 0.0, mud.k_p * EDGE_M2 * submerged_m
@@ -86,27 +52,11 @@ def law_of(mud: Mud) -> Law:
     return force_n
 
 
-@cache
-def motion(depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1) -> Sequence[Sample]:
-    """Return samples of joints that follow the gait exactly, without any current."""
-    walk, samples = Gait(gait, GEOMETRY), list[Sample]()
-    walk.reset(depth_m)
-    for tick in range(int(strides * stride_duration_s(gait, GEOMETRY, depth_m) / PERIOD_S)):
-        target = walk.step(PERIOD_S)
-        adduction_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
-        velocity_rad_s = GEOMETRY.adduction_velocity_rad_s(
-            target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
-        )
-        angles = (target.sweep_rad, adduction_rad, target.sweep_velocity_rad_s, velocity_rad_s)
-        samples.append(Sample((tick + 1) * PERIOD_S, target.phase, *angles, 0.0, 0.0))
-    return samples
-
-
-def first_below(samples: Iterable[Sample], depth_m: float) -> Sample:
+def first_below(samples: Iterable[Moment], depth_m: float) -> Moment:
     return next(sample for sample in samples if sample.depth_m > depth_m)
 
 
-def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
+def loaded(samples: Sequence[Moment], law: Law, mass: ArmMass = WEIGHTLESS) -> list[Row]:
     """Return the samples with the currents of the law's forces: the paper's map inverted, plus gravity and inertia."""
     result, before = [], samples[0]
     for sample in samples:
@@ -116,18 +66,16 @@ def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> l
         mud_adduction_nm = (LENGTH_M * force_z_n + sb * sa * mud_sweep_nm) / (cb * ca)
         weight_nm = mass.arm_mass_kg * 9.81 * mass.center_of_mass_m
         dt_s = sample.now_s - before.now_s or inf
-        sweep_rad_s2 = (sample.sweep_velocity_rad_s - before.sweep_velocity_rad_s) / dt_s
-        adduction_rad_s2 = (sample.adduction_velocity_rad_s - before.adduction_velocity_rad_s) / dt_s
+        sweep_rad_s2 = (sample.sweep_rad_s - before.sweep_rad_s) / dt_s
+        adduction_rad_s2 = (sample.adduction_rad_s - before.adduction_rad_s) / dt_s
         sweep_nm = mass.sweep_inertia_kg_m2 * sweep_rad_s2 - mud_sweep_nm - weight_nm * sa * sb
         adduction_nm = mass.adduction_inertia_kg_m2 * adduction_rad_s2 - mud_adduction_nm + weight_nm * ca * cb
         before = sample
-        result.append(
-            sample._replace(sweep_current_a=sweep_nm / SWEEP_NM_A, adduction_current_a=adduction_nm / ADDUCTION_NM_A)
-        )
+        result.append(sample.measured(sweep_nm / SWEEP_NM_A, adduction_nm / ADDUCTION_NM_A))
     return result
 
 
-def triggered(samples: Sequence[Sample], mud: Mud, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
+def triggered(samples: Sequence[Moment], mud: Mud, mass: ArmMass = WEIGHTLESS) -> list[Row]:
     """Load the samples as `loaded` does, from a sample on whose jump in force the trigger takes for the surface.
 
     There is no mud above it, so nothing is biased by finding the surface late.
@@ -141,25 +89,8 @@ def estimator(mass: ArmMass = WEIGHTLESS) -> PaperEstimator:
     return PaperEstimator("left", GEOMETRY, FlipperDrive(mass, SWEEP_NM_A, ADDUCTION_NM_A))
 
 
-def states_of(sample: Sample) -> FlipperJoints[DriveState]:
-    """Return messages that are as new as the tick."""
-    now_s, _, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, sweep_a, adduction_a, _ = sample
-    sweep = DriveState(sweep_rad, sweep_rad_s, now_s, sweep_a, now_s)
-    return FlipperJoints(sweep, DriveState(adduction_rad, adduction_rad_s, now_s, adduction_a, now_s))
-
-
-def feed(flipper: PaperEstimator, sample: Sample) -> tuple[FlipperLoad, StrideEstimate | None]:
-    return update(flipper, sample.now_s, sample.phase, *states_of(sample), sample.body_x_m)
-
-
-def closed(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> list[StrideEstimate]:
-    flipper = flipper or estimator()
-    strides = [feed(flipper, sample)[1] for sample in samples]
-    return [stride for stride in strides if stride is not None]
-
-
-def one(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> StrideEstimate:
-    (stride,) = closed(samples, flipper)
+def one(rows: Iterable[Row], flipper: PaperEstimator | None = None) -> StrideEstimate:
+    (stride,) = strides_of(rows, flipper or estimator())
     return stride
 
 
@@ -178,23 +109,23 @@ def assert_found(stride: StrideEstimate, mud: Mud, relative: float = EXACT) -> N
 @pytest.mark.parametrize("depth_m", [0.025, 0.03, 0.04, 0.05])
 @pytest.mark.parametrize("mud", [MUD, Mud(0.25e6, 0.137e6, 0.25e6, 0.0), Mud(2.2e6, 1.1e6, 2.06e6, -0.005)])
 def test_the_three_coefficients_of_known_mud_are_found(mud: Mud, depth_m: float) -> None:
-    assert_found(one(triggered(motion(depth_m), mud)), mud)
+    assert_found(one(triggered(walked(depth_m), mud)), mud)
 
 
 def test_the_law_is_found_through_the_pauses_of_the_single_flipper_protocol() -> None:
-    assert_found(one(triggered(motion(gait=SINGLE_FLIPPER), MUD)), MUD)
+    assert_found(one(triggered(walked(gait=SINGLE_FLIPPER), MUD)), MUD)
 
 
 def test_the_load_is_the_force_that_the_mud_exerts() -> None:
     law, flipper = law_of(MUD), estimator()
-    for sample in loaded(motion(), law):
-        load, _ = feed(flipper, sample)
+    for sample, row in zip(walked(), loaded(walked(), law), strict=True):
+        load, _ = update(flipper, *row)
         assert (load.force_x_n, load.force_z_n) == pytest.approx(law(sample), abs=1e-12)
         assert load.depth_m == sample.depth_m
 
 
 def test_forces_and_durations_of_the_stride_are_reported() -> None:
-    samples = triggered(motion(), MUD)
+    samples = triggered(walked(), MUD)
     stride = one(samples)
     start = first_below(samples, MUD.surface_m)
     submerged_m = 0.03 - start.depth_m
@@ -212,9 +143,9 @@ def test_forces_and_durations_of_the_stride_are_reported() -> None:
 
 def test_the_force_outside_of_the_steady_part_of_stance_does_not_count() -> None:
     law, steady_rad = law_of(MUD), STEADY_FRACTION * radians(30.0)
-    samples = motion()
+    samples = walked()
 
-    def slow_to_mobilise(sample: Sample) -> Force:
+    def slow_to_mobilise(sample: Moment) -> Force:
         unsteady = sample.phase is Phase.STANCE and abs(sample.sweep_rad) > steady_rad
         return (0.0, 0.0) if unsteady else law(sample)
 
@@ -222,9 +153,9 @@ def test_the_force_outside_of_the_steady_part_of_stance_does_not_count() -> None
 
 
 def test_the_first_rise_of_the_extraction_does_not_count() -> None:
-    law, samples = law_of(MUD), motion()
+    law, samples = law_of(MUD), walked()
 
-    def springy(sample: Sample) -> Force:
+    def springy(sample: Moment) -> Force:
         springing = sample.phase is Phase.EXTRACTION and sample.depth_m > 0.03 - 0.9 * MOBILISED_M
         return (0.0, 2.0) if springing else law(sample)
 
@@ -237,7 +168,7 @@ def test_the_first_rise_of_the_extraction_does_not_count() -> None:
 @pytest.mark.parametrize("slope_n_m", [50.0, 100.0, 160.0, 300.0])
 def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope(slope_n_m: float) -> None:
     mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
-    stride = one(loaded(motion(), law_of(mud)))
+    stride = one(loaded(walked(), law_of(mud)))
     late_m = stride.surface_m - mud.surface_m
     per_tick_m = 0.1 / 0.88 * PERIOD_S
     assert SURFACE_FORCE_N / slope_n_m < late_m <= SURFACE_FORCE_N / slope_n_m + per_tick_m
@@ -248,7 +179,7 @@ def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope(slop
 @pytest.mark.parametrize("slope_n_m", [50.0, 100.0, 160.0, 300.0])
 def test_the_bias_of_each_coefficient_is_that_of_the_late_surface(slope_n_m: float) -> None:
     mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
-    samples = motion()
+    samples = walked()
     stride = one(loaded(samples, law_of(mud)))
     late_m = stride.surface_m
 
@@ -266,16 +197,8 @@ def test_the_bias_of_each_coefficient_is_that_of_the_late_surface(slope_n_m: flo
 # noise, duplicates, gaps
 
 
-def noisy(samples: list[Sample], seed: int, noise_a: float) -> list[Sample]:
-    noise = np.random.default_rng(seed).normal(0.0, noise_a, (len(samples), 2)).tolist()
-    return [
-        sample._replace(sweep_current_a=sample.sweep_current_a + a, adduction_current_a=sample.adduction_current_a + b)
-        for sample, (a, b) in zip(samples, noise, strict=True)
-    ]
-
-
 def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
-    samples = triggered(motion(), MUD)
+    samples = triggered(walked(), MUD)
     scores = []
     for seed in range(60):
         stride = one(noisy(samples, seed, 0.1))
@@ -286,12 +209,9 @@ def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
 
 
 def test_the_law_is_found_from_every_other_sample() -> None:
-    samples = motion()
+    samples = walked()
     start = samples.index(first_below(samples, MUD.surface_m)) % 2
-    thinned = [
-        sample if index % 2 == start else sample._replace(adduction_rad=nan)
-        for index, sample in enumerate(triggered(samples, MUD))
-    ]
+    thinned = [row if index % 2 == start else row.lost() for index, row in enumerate(triggered(samples, MUD))]
     assert_found(one(thinned), MUD)
 
 
@@ -299,15 +219,15 @@ def test_the_law_is_found_from_every_other_sample() -> None:
 
 
 def test_gravity_and_inertia_are_taken_off() -> None:
-    samples = triggered(motion(), MUD, HEAVY)
+    samples = triggered(walked(), MUD, HEAVY)
     assert_found(one(samples, estimator(HEAVY)), MUD)
 
 
 def test_unknown_velocities_leave_only_inertia_in() -> None:
     slow = ArmMass(0.3, 0.07, 0.0, 0.0)
     samples = [
-        sample._replace(sweep_velocity_rad_s=nan, adduction_velocity_rad_s=nan)
-        for sample in triggered(motion(), MUD, slow)
+        row._replace(sweep=row.sweep._replace(velocity_rad_s=nan), adduction=row.adduction._replace(velocity_rad_s=nan))
+        for row in triggered(walked(), MUD, slow)
     ]
     assert_found(one(samples, estimator(HEAVY)), MUD)
 
@@ -315,13 +235,13 @@ def test_unknown_velocities_leave_only_inertia_in() -> None:
 # the body's drag
 
 
-def advancing(samples: Sequence[Sample], speed_m_s: float) -> list[Sample]:
-    return [sample._replace(body_x_m=speed_m_s * sample.now_s) for sample in samples]
+def advancing(rows: Sequence[Row], speed_m_s: float) -> list[Row]:
+    return [row._replace(body_m=speed_m_s * row.now_s) for row in rows]
 
 
 def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
     """At 0.2 m/s the body has advanced by 2 mm long before the steady part of stance."""
-    samples, drag_n = triggered(motion(), MUD), 2.5
+    samples, drag_n = triggered(walked(), MUD), 2.5
     plain = one(samples)
     reported = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
     added_n_m3 = drag_n / (WIDTH_M * plain.depth_m**2 / 2.0)
@@ -333,7 +253,7 @@ def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
 
 @pytest.mark.parametrize("speed_m_s", [0.0, -0.2, nan])
 def test_no_drag_is_added_where_the_body_does_not_advance(speed_m_s: float) -> None:
-    samples = triggered(motion(), MUD)
+    samples = triggered(walked(), MUD)
     reported = one(advancing(samples, speed_m_s), PaperEstimator("left", GEOMETRY, DRIVE, 2.5))
     assert reported.k_s == one(samples).k_s
 
@@ -342,7 +262,7 @@ def test_no_drag_is_added_where_the_body_does_not_advance(speed_m_s: float) -> N
 
 
 def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
-    stride = one(motion())
+    stride = one(loaded(walked(), lambda sample: (0.0, 0.0)))
     assert stride.k_p.reason == "no force above 0.5 N in insertion"
     for estimate in (stride.k_p, stride.k_s, stride.k_e):
         assert not estimate.valid

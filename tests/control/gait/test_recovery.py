@@ -207,7 +207,7 @@ def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() ->
     assert freed().phases[:6] == [
         Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY, Phase.SWING, Phase.INSERTION,
     ]  # fmt: skip
-    assert freed().events == [
+    assert freed().events[:3] == [
         "both flippers are stuck, attempt 1 of 3",
         "both flippers are stuck, attempt 2 of 3",
         "the flippers came out after 2 attempts",

@@ -174,6 +174,7 @@ def test_the_torque_of_a_message_that_is_seen_again_is_not_counted() -> None:
         # more than the noise of an encoder
         ([(0.0, 0.0, 0.0), (0.002, 0.05, 0.0)], ""),
         ([(0.0, 0.0, 0.0), (0.002, nextafter(0.05, 1.0), 0.0)], "encoder_jump"),
+        ([(0.0, 0.0, 16.0), (0.02, -0.32, 16.0)], "encoder_jump"),  # as far in the other direction
         # over more than 30 ms two velocities give no path
         ([(0.0, 0.0, 0.0), (0.03, 1.0, 0.0)], "encoder_jump"),
         ([(0.0, 0.0, 0.0), (nextafter(0.03, 1.0), 1.0, 0.0)], ""),
