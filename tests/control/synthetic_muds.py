@@ -9,7 +9,8 @@ from math import nan
 import numpy as np
 
 from control.computing.bounded_work import finish
-from control.depth.depth_choice import Adaptation, DepthChoice
+from control.depth.depth_choice import DepthAdaptation, DepthChoice
+from control.depth.paper_choice import PaperAdaptation
 from control.geometry import FlipperGeometry
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
@@ -41,7 +42,10 @@ def reported(
 
 
 def choose_now(
-    adaptation: Adaptation, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float | None = None
+    adaptation: DepthAdaptation | PaperAdaptation,
+    mud_estimate: MudEstimate,
+    strides: Sequence[StrideEstimate],
+    walked_m: float | None = None,
 ) -> DepthChoice:
     """Run all units of a choice at once, after a stride at `walked_m` or at the depth of the choice before."""
     return finish(adaptation.choose(mud_estimate, strides, adaptation.choice.depth_m if walked_m is None else walked_m))

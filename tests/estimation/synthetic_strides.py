@@ -79,11 +79,11 @@ class Row(NamedTuple):
         )
 
     def later(self, seconds: float) -> Row:
-        joints = [
+        sweep, adduction = (
             each._replace(angle_stamp_s=each.angle_stamp_s + seconds, current_stamp_s=each.current_stamp_s + seconds)
             for each in (self.sweep, self.adduction)
-        ]
-        return Row(self.now_s + seconds, self.phase, *joints, self.body_m)
+        )
+        return Row(self.now_s + seconds, self.phase, sweep, adduction, self.body_m)
 
 
 def joints(target: GaitTarget) -> tuple[float, float, float, float]:

@@ -75,21 +75,14 @@ def test_the_pose_comes_with_its_depth_and_levers(sweep: float, lift: float) -> 
     assert load.rise_adduction_m == pytest.approx(jacobian.z_adduction, abs=1e-15)
 
 
-def test_friction_is_what_the_motor_spends_on_itself() -> None:
-    friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
-    drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
-    spent_nm = friction.torque_nm(0.1, 2.0)
-    free = (sample(0.1, 2.0, spent_nm / SWEEP_NM_A, 1.0), sample(0.1, -2.0, -spent_nm / LIFT_NM_A, 1.0))
-    load = one(drive, *free)
-    assert (load.sweep_nm, load.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
-
-
-def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
+def test_friction_is_what_the_motor_spends_on_itself_and_that_of_an_unknown_velocity_is_cogging_alone() -> None:
     friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004, cogging_nm=0.01, cogging_per_turn=1)
     drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
-    load = one(drive, sample(0.5, nan, 0.0, 1.0), sample(-0.5, inf, 0.0, 1.0))
-    assert load.sweep_nm == pytest.approx(0.01 * sin(0.5))
-    assert load.adduction_nm == pytest.approx(-0.01 * sin(0.5))
+    spent_nm = [friction.torque_nm(0.5, 2.0), friction.torque_nm(-0.5, -2.0)]
+    free = one(drive, sample(0.5, 2.0, spent_nm[0] / SWEEP_NM_A, 1.0), sample(-0.5, -2.0, spent_nm[1] / LIFT_NM_A, 1.0))
+    assert (free.sweep_nm, free.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
+    unknown = one(drive, sample(0.5, nan, 0.0, 1.0), sample(-0.5, inf, 0.0, 1.0))
+    assert (unknown.sweep_nm, unknown.adduction_nm) == pytest.approx((0.01 * sin(0.5), -0.01 * sin(0.5)))
 
 
 @pytest.mark.parametrize(
@@ -148,31 +141,21 @@ def loads_of_a_free_arm(angle_every_s: float, current_every_s: float, shift_s: f
     return seen
 
 
-def largest_nm(loads: list[JointLoad]) -> float:
-    return max(max(abs(load.sweep_nm), abs(load.adduction_nm)) for load in loads)
-
-
 INERTIA_NM = MASS.adduction_inertia_kg_m2 * 0.2 * 25.0**2
 
 
-def test_a_free_arm_in_quick_motion_withstands_no_load() -> None:
-    """Lines instead of curves leave (ω dt)²/8 of the 0.08 N·m that the inertia takes: 0.1 %."""
-    assert largest_nm(loads_of_a_free_arm(PERIOD_S, PERIOD_S, 0.0)) < 0.002 * INERTIA_NM
-
-
-@pytest.mark.parametrize("shift_s", [0.0005, 0.001, 0.0015])
-def test_a_current_of_another_time_is_interpolated_to_that_of_the_acceleration(shift_s: float) -> None:
-    """Without interpolation a current half a tick aside would leave ω dt/2 = 3 %."""
-    loads = loads_of_a_free_arm(PERIOD_S, PERIOD_S, shift_s)
-    assert largest_nm(loads) < 0.01 * INERTIA_NM
-
-
-@pytest.mark.parametrize("ticks", [2, 4])
-def test_a_current_that_comes_without_a_new_angle_keeps_the_last_acceleration(ticks: int) -> None:
-    """Otherwise all inertia would be left, several times per message. (ω dt)²/8 grows with the angle's interval."""
-    loads = loads_of_a_free_arm(ticks * PERIOD_S, PERIOD_S, 0.0005)
+@pytest.mark.parametrize(
+    ("ticks", "shift_s", "fraction"),
+    [
+        (1, 0.0, 0.002),  # lines instead of curves leave (ω dt)²/8 of the 0.08 N·m that the inertia takes
+        *((1, shift_s, 0.01) for shift_s in (0.0005, 0.001, 0.0015)),  # uninterpolated, half a tick leaves 3 %
+        *((ticks, 0.0005, 0.02) for ticks in (2, 4)),  # without a new angle the last acceleration counts
+    ],
+)
+def test_a_free_arm_in_quick_motion_withstands_no_load(ticks: int, shift_s: float, fraction: float) -> None:
+    loads = loads_of_a_free_arm(ticks * PERIOD_S, PERIOD_S, shift_s)
     assert len(loads) > 100
-    assert largest_nm(loads) < 0.02 * INERTIA_NM
+    assert max(max(abs(load.sweep_nm), abs(load.adduction_nm)) for load in loads) < fraction * INERTIA_NM
 
 
 def test_a_joint_whose_message_is_late_does_not_lose_its_inertia() -> None:
@@ -207,55 +190,33 @@ def test_samples_that_are_not_of_one_motion_are_used_unchanged(gap_s: float) -> 
 
 
 @pytest.mark.parametrize(
-    ("stamps_s", "current_a"),
-    [
-        ((1.000, 1.010), 3.0),  # at the times of the angles: half-way
-        ((1.005, 1.015), 2.0),  # the earlier current is of that very time
-        ((0.995, 1.005), 4.0),
-        ((0.990, 1.000), 5.0),  # a little old: extrapolated by half a gap
-        ((0.970, 0.971), 6.0),  # long ago: extrapolated by at most one gap beyond the last
-        ((1.020, 1.021), 0.0),  # long after: extrapolated by at most one gap before the first
-        ((1.005, 1.005), 4.0),  # the same message: unchanged
-        ((1.006, 1.004), 4.0),
-    ],
-)
-def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[float, float], current_a: float) -> None:
-    before = DriveState(0.0, 0.0, 1.00, 2.0, stamps_s[0])
-    now = DriveState(0.1, 1.0, 1.01, 4.0, stamps_s[1])
-    assert motion_between(before, now)[3] == pytest.approx(current_a)
-
-
-@pytest.mark.parametrize(
     ("stamps_s", "commands_s", "current_a"),
     [
-        ((0.999, 1.009), (0.995, 1.002), 3.6),  # the earlier command counts for two tenths of the time
-        ((0.999, 1.009), (0.990, 0.9995), 4.0),  # the later command counts for all of it
-        ((1.008, 1.012), (1.000, 1.011), 2.0),  # the earlier command counts for all of it
+        ((1.000, 1.010), NO_COMMANDS, 3.0),  # at the times of the angles: half-way
+        ((1.005, 1.015), NO_COMMANDS, 2.0),  # the earlier current is of that very time
+        ((0.995, 1.005), NO_COMMANDS, 4.0),
+        ((0.990, 1.000), NO_COMMANDS, 5.0),  # a little old: extrapolated by half a gap
+        ((0.970, 0.971), NO_COMMANDS, 6.0),  # long ago: extrapolated by at most one gap beyond the last
+        ((1.020, 1.021), NO_COMMANDS, 0.0),  # long after: extrapolated by at most one gap before the first
+        ((1.005, 1.005), NO_COMMANDS, 4.0),  # the same message: unchanged
+        ((1.006, 1.004), NO_COMMANDS, 4.0),
+        # the current of each of two commands counts for its time
+        ((0.999, 1.009), (0.995, 1.002), 3.6),  # the earlier one for two tenths
+        ((0.999, 1.009), (0.990, 0.9995), 4.0),  # the later one for all of it
+        ((1.008, 1.012), (1.000, 1.011), 2.0),  # the earlier one for all of it
+        # currents that do not answer the last two commands are interpolated
+        ((0.999, 1.009), (1.000, 1.005), 3.2),  # the earlier current answers an older command
+        ((0.999, 1.009), (0.990, 1.0095), 3.2),  # the later current does not answer the later command yet
+        ((0.999, 1.009), (0.990, 0.9985), 3.2),  # both currents answer the later command
+        ((0.999, 1.009), (nan, 1.005), 3.2),
     ],
 )
-def test_the_current_of_each_of_two_commands_counts_for_its_time(
-    stamps_s: tuple[float, float], commands_s: tuple[float, float], current_a: float
+def test_the_current_is_that_of_the_moment_between_the_angles(
+    stamps_s: tuple[float, float], commands_s: CommandTimes, current_a: float
 ) -> None:
     before = DriveState(0.0, 0.0, 1.00, 2.0, stamps_s[0])
     now = DriveState(0.1, 1.0, 1.01, 4.0, stamps_s[1])
     assert motion_between(before, now, commands_s)[3] == pytest.approx(current_a)
-
-
-@pytest.mark.parametrize(
-    "commands_s",
-    [
-        (1.000, 1.005),  # the earlier current answers an older command
-        (0.990, 1.0095),  # the later current does not answer the later command yet
-        (0.990, 0.9985),  # both currents answer the later command
-        (nan, 1.005),
-    ],
-)
-def test_currents_that_do_not_answer_the_last_two_commands_are_interpolated(
-    commands_s: tuple[float, float],
-) -> None:
-    before = DriveState(0.0, 0.0, 1.00, 2.0, 0.999)
-    now = DriveState(0.1, 1.0, 1.01, 4.0, 1.009)
-    assert motion_between(before, now, commands_s) == motion_between(before, now, NO_COMMANDS)
 
 
 MUD_NM = -0.1
@@ -325,13 +286,14 @@ def test_an_unknown_joint_does_not_invalidate_the_other_one() -> None:
 # what is new
 
 
-def test_a_sample_that_repeats_the_one_before_gives_no_load() -> None:
+def test_a_sample_that_repeats_the_one_before_gives_no_load_until_a_reset() -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
-    assert loads.update(*pair) is not None
-    assert loads.update(*pair) is None
+    first = loads.update(*pair)
     sweep, adduction = (each._replace(angle_stamp_s=1.1, current_stamp_s=1.1) for each in pair)
-    assert loads.update(sweep, adduction) is None
+    assert first is not None and loads.update(*pair) is loads.update(sweep, adduction) is None
+    loads.reset()
+    assert loads.update(*pair) == first
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -343,14 +305,6 @@ def test_a_change_of_any_angle_or_current_is_new(index: int, field: str) -> None
     change: dict[str, Any] = {field: 0.5}
     pair[index] = pair[index]._replace(**change)
     assert loads.update(pair[0], pair[1]) is not None
-
-
-def test_a_reset_forgets_the_sample_before() -> None:
-    loads = JointLoads(GEOMETRY, DRIVE)
-    pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
-    first = loads.update(*pair)
-    loads.reset()
-    assert loads.update(*pair) == first
 
 
 anything = st.floats()

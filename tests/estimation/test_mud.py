@@ -1,4 +1,4 @@
-"""Both flippers together: the samples that each one gets, the messages' ages, and what is remembered between strides.
+"""Both flippers together: the samples that each one gets, and what is remembered between strides.
 
 The strokes are synthetic, through mud that keeps the estimator's own laws. One flipper's estimates have their own
 tests; here each flipper must give what it would give alone.
@@ -6,13 +6,11 @@ tests; here each flipper must give what it would give alone.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import nan, pi, sin
+from math import nan
 
 import pytest
 
 from control.mud_estimate import NOTHING_KNOWN
-from control.parameters.arm_mass import ArmMass
-from control.rate import PERIOD_S
 from control.records import FLIPPERS, BodyPose, Joints, Phase, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters, Method, PaperEstimationParameters
 from estimation.flipper import FlipperEstimator
@@ -25,7 +23,6 @@ from estimation.strokes.shear import Base
 from tests.estimation.synthetic_strides import DRIVE, GEOMETRY, K_P, WEIGHTLESS, Row, stride_samples
 from tests.estimation.synthetic_strides import update as update_one
 
-Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
 
 
@@ -176,63 +173,3 @@ def test_a_reset_forgets_strides_estimate_and_map(method: Method) -> None:
     assert mud.map.rows() == ()
     assert repr(strides_of(mud, walk(1), walk(2), speed_m_s=0.1)) == repr(first)
     assert (mud.mud_estimate, mud.map.rows()) == (mud_estimate, rows)
-
-
-# ages: when a message was measured
-
-
-ARM = FlipperDrive(ArmMass(0.0, 0.0, 0.0004, 0.0006), 0.083, 0.083)
-SWAY_RAD, SWAY_RAD_S = 0.15, 2.0 * pi * 5.0  # up to 150 rad/s², as much as a quick extraction
-LARGEST_NM = 0.0006 * SWAY_RAD * SWAY_RAD_S**2
-
-
-def swayed(tick: int, age_s: float) -> tuple[float, float, float]:
-    """Return the angle, velocity and acceleration of an arm `age_s` before a tick. A motor holds its torque from tick
-    to tick, so its arm accelerates evenly between ticks and has the speed of a sine at each of them.
-    """
-    sways = [SWAY_RAD_S * PERIOD_S * (tick - ticks) for ticks in (0, 1)]
-    after, before = (SWAY_RAD * SWAY_RAD_S * sin(sway + pi / 2.0) for sway in sways)
-    acceleration = (after - before) / PERIOD_S
-    return (
-        SWAY_RAD * sin(sways[0]) - age_s * after + acceleration * age_s**2 / 2.0,
-        after - age_s * acceleration,
-        acceleration,
-    )
-
-
-def load_of_a_free_arm_nm(angle_ages_s: Four, current_ages_s: Four, reported: bool) -> list[float]:
-    """Return the largest load of each joint of arms that sway in the air, where all torque is inertia and there is no
-    load.
-
-    `reported` states whether the estimator knows the ages.
-    """
-    mud, largest_nm = MudEstimator(GEOMETRY, (ARM, ARM)), [0.0] * 4
-    inertias = (0.0004, 0.0006, 0.0004, 0.0006)
-    for tick in range(120):
-        now_s = tick * PERIOD_S
-        angles, speeds, _ = zip(*(swayed(tick, age_s) for age_s in angle_ages_s), strict=True)
-        currents = [
-            inertia * swayed(tick, age_s)[2] / 0.083 for inertia, age_s in zip(inertias, current_ages_s, strict=True)
-        ]
-        ages = (angle_ages_s, current_ages_s) if reported else (FRESH, FRESH)
-        states = recorded_states(now_s, angles, speeds, currents, *ages)
-        reading = mud.update(now_s, Phase.REST, states, BodyPose(now_s, 0.0))
-        loads = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
-        if tick > 1:  # an acceleration needs two samples
-            largest_nm = [max(a, abs(b)) for a, b in zip(largest_nm, loads, strict=True)]
-    return largest_nm
-
-
-FRESH: Four = (0.0, 0.0, 0.0, 0.0)
-ANGLES_OLD: tuple[Four, Four] = ((0.001, 0.0005, 0.0, 0.002), FRESH)
-CURRENTS_OLD: tuple[Four, Four] = (FRESH, (0.001, 0.0, 0.0005, 0.002))
-BOTH_OLD: tuple[Four, Four] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0, 0.001))
-
-
-@pytest.mark.parametrize("ages", [(FRESH, FRESH), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
-def test_messages_of_any_age_give_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
-    assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
-
-
-def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_age() -> None:
-    assert max(load_of_a_free_arm_nm(*CURRENTS_OLD, reported=False)) < 1e-9 * LARGEST_NM

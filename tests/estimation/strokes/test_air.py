@@ -10,18 +10,15 @@ from estimation.strokes.air import AIR_NM, MEASURED_NM, SHORTEST_RAD, UNKNOWN_FR
 COUNT = 200
 
 
-def swing(
-    air: AirSwing, friction_nm: float, inertia_nm: float = 0.0, offset_nm: float = 0.0, back: bool = False
-) -> None:
-    """Feed a swing from -35 to +35 degrees, from rest to rest, with dry friction, inertia and an offset of the
-    current.
-    """
+def swung(friction_nm: float, inertia_nm: float = 0.0, air: AirSwing | None = None) -> AirSwing:
+    """Feed a swing from -35 to +35 degrees, from rest to rest, with dry friction and inertia."""
+    air = air or AirSwing()
     for i in range(COUNT + 1):
         time = i / COUNT
-        sweep_rad = -0.6 * cos(pi * time) * (-1.0 if back else 1.0)
-        resisting_nm = (friction_nm if back else -friction_nm) if 0 < i < COUNT else 0.0
-        accelerating_nm = inertia_nm * cos(pi * time) * (-1.0 if back else 1.0)
-        air.update(sweep_rad, resisting_nm + accelerating_nm + offset_nm)
+        resisting_nm = -friction_nm if 0 < i < COUNT else 0.0
+        air.update(-0.6 * cos(pi * time), resisting_nm + inertia_nm * cos(pi * time))
+    air.close()
+    return air
 
 
 def test_before_any_swing_the_friction_is_unknown() -> None:
@@ -32,9 +29,7 @@ def test_before_any_swing_the_friction_is_unknown() -> None:
 @pytest.mark.parametrize("friction_nm", [0.0, 0.02, 0.06, 0.12])
 @pytest.mark.parametrize("inertia_nm", [0.0, 0.3])
 def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm: float) -> None:
-    air = AirSwing()
-    swing(air, friction_nm, inertia_nm)
-    air.close()
+    air = swung(friction_nm, inertia_nm)
     assert air.friction_nm == pytest.approx(friction_nm, abs=1e-3)
     assert air.std_error_nm == MEASURED_NM
 
@@ -42,23 +37,16 @@ def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm:
 def test_dragged_mud_only_adds_so_the_least_swing_counts() -> None:
     air = AirSwing()
     for dragged_nm in (0.0, 0.05, 0.08, 0.03):
-        swing(air, 0.05 + dragged_nm)
-        air.close()
+        swung(0.05 + dragged_nm, air=air)
     assert air.friction_nm == pytest.approx(0.05, abs=1e-3)
 
 
 def test_a_swing_through_mud_does_not_count_as_air_and_changes_nothing() -> None:
-    air = AirSwing()
-    swing(air, 0.04)
-    air.close()
+    air = swung(0.04)
     before_nm = air.friction_nm
-    swing(air, AIR_NM + 0.1)
-    air.close()
-    assert not air.is_air
-    assert air.friction_nm == before_nm
-    swing(air, 0.05)
-    air.close()
-    assert air.is_air
+    swung(AIR_NM + 0.1, air=air)
+    assert (air.is_air, air.friction_nm) == (False, before_nm)
+    assert swung(0.05, air=air).is_air
 
 
 def test_a_short_movement_is_no_swing() -> None:
@@ -75,23 +63,15 @@ def test_a_short_movement_is_no_swing() -> None:
 )
 def test_mud_needs_much_more_torque_than_friction(friction_nm: float, stance_nm: float, is_mud: bool) -> None:
     """In the authors' logs a stance in mud begins at 0.44 N·m, and in air it has 0.05 to 0.07 N·m."""
-    air = AirSwing()
-    swing(air, friction_nm)
-    air.close()
-    assert air.is_push(stance_nm) is is_mud
+    assert swung(friction_nm).is_push(stance_nm) is is_mud
 
 
 @pytest.mark.parametrize(("extraction_nm", "is_pull"), [(0.07, False), (0.14, False), (0.25, True)])
 def test_only_mud_pulls_harder_than_any_friction(extraction_nm: float, is_pull: bool) -> None:
-    air = AirSwing()
-    swing(air, 0.05)
-    air.close()
-    assert air.is_pull(extraction_nm) is is_pull
+    assert swung(0.05).is_pull(extraction_nm) is is_pull
 
 
 def test_a_reset_forgets_the_friction() -> None:
-    air = AirSwing()
-    swing(air, 0.05)
-    air.close()
+    air = swung(0.05)
     air.reset()
     assert (air.friction_nm, air.std_error_nm, air.is_air) == (0.0, UNKNOWN_FRICTION_NM, True)

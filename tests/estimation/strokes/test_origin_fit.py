@@ -198,6 +198,3 @@ anything = st.floats()
 def test_nothing_makes_the_fit_raise(pairs: list[tuple[float, float]]) -> None:
     fit = fit_through_origin([x for x, _ in pairs], [y for _, y in pairs])
     assert fit is None or isfinite(fit.slope)
-
-
-modest = st.floats(-100.0, 100.0)

@@ -70,6 +70,11 @@ def without_pose(batches: Sequence[Batch]) -> list[Batch]:
     return [batch._replace(body_m=nan) for batch in batches]
 
 
+def shaken(batches: Sequence[Batch], fraction: float) -> list[Batch]:
+    """Let the torques alternate by a fraction to either side."""
+    return [b._replace(sweep_nm=b.sweep_nm * (1.0 + (fraction if i % 2 else -fraction))) for i, b in enumerate(batches)]
+
+
 def found(batches: Sequence[Batch], base: Base = Base.FREE, drag_n: float = DRAG_N, surface_m: float = 0.0) -> Shear:
     return find_shear(GEOMETRY, batches, surface_m, base, drag_n)
 
@@ -106,22 +111,16 @@ def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough()
     """The fit takes exactly those pieces, whose torques alternate by ±2 %."""
     even = sheared(poses())
     full = [fraction > (1.0 - EXACT) * K_S for fraction in withstood(even)]
-    shaken = [b._replace(sweep_nm=b.sweep_nm * (1.02 if i % 2 else 0.98)) for i, b in enumerate(even)]
-    reported = [b for b, is_full in zip(shaken, full, strict=True) if is_full]
-    shear = found(shaken)
+    uneven = shaken(even, 0.02)
+    reported = [b for b, is_full in zip(uneven, full, strict=True) if is_full]
+    shear = found(uneven)
     assert shear.fit == fit_through_origin([moment_m4(b) for b in reported], [b.sweep_nm for b in reported])
     assert shear.samples == 10 * len(reported)
 
 
-def test_a_fixed_base_ignores_the_pose() -> None:
-    assert found(pressed(poses(0.9)), Base.FIXED).case == "yield"
-
-
 def test_the_uncertainty_is_that_of_the_batches_that_yield() -> None:
     """The torques alternate by ±5 %: the error is larger than without scatter and smaller than 5 %."""
-    batches = pressed(poses())
-    shaken = [b._replace(sweep_nm=b.sweep_nm * (1.05 if i % 2 else 0.95)) for i, b in enumerate(batches)]
-    fit = found(shaken).fit
+    fit = found(shaken(pressed(poses()), 0.05)).fit
     assert fit is not None
     assert 0.003 * K_S < fit.std_error < 0.05 * K_S
 
@@ -129,20 +128,43 @@ def test_the_uncertainty_is_that_of_the_batches_that_yield() -> None:
 # the body moves
 
 
-def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
-    """The mud only has to withstand the body's drag, a third of its strength."""
-    shear = found(pressed(poses(0.95), K_S / 3.0))
-    assert (shear.case, shear.at_least, shear.reason) == ("limited_by_body", True, "the mud held: the body moved")
-    assert k_of(shear) == pytest.approx(K_S / 3.0, rel=EXACT)
-    assert shear.samples == 10 * COUNT
+def stuck(count: int) -> list[Batch]:
+    return [batch._replace(saturated=i >= count - 2) for i, batch in enumerate(pressed(poses(count=count)))]
 
 
-@pytest.mark.parametrize("body_fraction", [0.25, 0.5, 0.7])
-def test_where_the_plate_slips_while_the_body_advances_the_strength_is_reported(body_fraction: float) -> None:
-    """At 70 % of 12 cm the plate slips 3.6 cm: few batches are left, but each has the full strength."""
-    shear = found(sheared(poses(body_fraction), base=Base.FREE))
-    assert (shear.case, shear.at_least) == ("mixed", False)
-    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
+def creeping(samples: int) -> list[Batch]:
+    """Return a stance of 21 batches, of which two with these samples are clipped."""
+    return [b._replace(saturated=True, samples=samples) if i in (8, 9) else b for i, b in enumerate(pressed(poses()))]
+
+
+BODY, MOTOR, NO_POSE = "the mud held: the body moved", "a motor at its limit", "no pose: the body may have moved"
+
+
+@pytest.mark.parametrize(
+    ("batches", "base", "case", "k_s", "reason"),
+    [
+        # the mud only has to withstand the body's drag, a third of its strength
+        (pressed(poses(0.95), K_S / 3.0), Base.FREE, "limited_by_body", K_S / 3.0, BODY),
+        (pressed(poses(0.9)), Base.FIXED, "yield", K_S, ""),  # a fixed base ignores the pose
+        # a plate that hardly slips is held; over a long path it would slip MOBILISED_M all the same
+        (pressed(poses(1.0 - 0.9 * SLIPPING)), Base.FREE, "limited_by_body", K_S, BODY),
+        # at 70 % of 12 cm the plate slips 3.6 cm: few batches are left, but each has the full strength
+        *((sheared(poses(fraction)), Base.FREE, "mixed", K_S, "") for fraction in (0.25, 0.5, 0.7)),
+        *((stuck(6), base, "limited_by_motor", K_S, MOTOR) for base in (Base.FREE, Base.FIXED)),
+        (stuck(COUNT), Base.FREE, "yield", K_S, ""),  # it shears the mud all the same
+        # 38 samples in each are 28.6 % of the stance, 42 are 30.7 %: a plate that creeps does not yield
+        *((creeping(38), base, "yield", K_S, "") for base in (Base.FREE, Base.FIXED)),
+        *((creeping(42), base, "limited_by_motor", K_S, MOTOR) for base in (Base.FREE, Base.FIXED)),
+        (without_pose(pressed(poses())), Base.FREE, "unknown", K_S, NO_POSE),
+    ],
+)
+def test_the_strength_is_a_value_where_the_plate_slips_and_a_bound_where_body_or_motor_gives_way(
+    batches: list[Batch], base: Base, case: str, k_s: float, reason: str
+) -> None:
+    shear = found(batches, base)
+    assert (shear.case, shear.at_least, shear.reason) == (case, bool(reason), reason)
+    assert k_of(shear) == pytest.approx(k_s, rel=EXACT)
+    assert not reason or shear.samples == sum(batch.samples for batch in batches)
 
 
 def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
@@ -156,12 +178,6 @@ def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
     assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the batch in between has half of each
 
 
-def test_a_plate_that_hardly_slips_is_held() -> None:
-    """Over a long path the plate would slip MOBILISED_M all the same."""
-    fraction = 1.0 - 0.9 * SLIPPING
-    assert found(pressed(poses(fraction))).case == "limited_by_body"
-
-
 def test_the_slip_is_the_path_back_through_the_mud() -> None:
     batches = poses(0.4)
     reported = slips_m(GEOMETRY, batches, Base.FREE)
@@ -173,33 +189,6 @@ def test_the_slip_is_the_path_back_through_the_mud() -> None:
 
 
 # a motor at its limit
-
-
-def stuck(count: int) -> list[Batch]:
-    return [batch._replace(saturated=i >= count - 2) for i, batch in enumerate(pressed(poses(count=count)))]
-
-
-@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
-def test_a_motor_at_its_limit_bounds_the_strength(base: Base) -> None:
-    shear = found(stuck(6), base)
-    assert (shear.case, shear.at_least, shear.reason) == ("limited_by_motor", True, "a motor at its limit")
-    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
-
-
-def test_a_motor_at_its_limit_that_shears_the_mud_gives_its_strength() -> None:
-    shear = found(stuck(COUNT))
-    assert (shear.case, shear.at_least) == ("yield", False)
-
-
-@pytest.mark.parametrize(("samples", "case"), [(38, "yield"), (42, "limited_by_motor")])
-@pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
-def test_a_plate_that_creeps_while_the_motor_is_clipped_does_not_yield(samples: int, case: str, base: Base) -> None:
-    """Two of 21 batches are clipped. 38 samples in each are 28.6 % of the stance, 42 are 30.7 %."""
-    batches = [
-        b._replace(saturated=True, samples=samples) if i in (8, 9) else b for i, b in enumerate(pressed(poses()))
-    ]
-    shear = found(batches, base)
-    assert (shear.case, shear.at_least) == (case, case != "yield")
 
 
 @pytest.mark.parametrize("depth_m", [0.02, 0.05])
@@ -234,13 +223,6 @@ def test_a_bound_becomes_a_value_once_a_fit_has_enough_pieces() -> None:
 
 
 # without a pose
-
-
-def test_above_the_bodys_drag_it_may_have_moved() -> None:
-    shear = found(without_pose(pressed(poses())))
-    assert (shear.case, shear.at_least) == ("unknown", True)
-    assert shear.reason == "no pose: the body may have moved"
-    assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
 @pytest.mark.parametrize(("fraction", "case"), [(0.79, "yield"), (0.81, "unknown")])
@@ -287,8 +269,8 @@ def test_the_bound_is_the_largest_sustained_load() -> None:
 
 def test_an_uneven_load_makes_a_bound_more_uncertain() -> None:
     even = pressed(poses(1.0))
-    uneven = [b._replace(sweep_nm=b.sweep_nm * (1.2 if i % 2 else 0.8)) for i, b in enumerate(even)]
-    uncertainties = [fit.std_error / fit.slope for fit in (found(even).fit, found(uneven).fit) if fit is not None]
+    fits = [found(batches).fit for batches in (even, shaken(even, 0.2))]
+    uncertainties = [fit.std_error / fit.slope for fit in fits if fit is not None]
     assert uncertainties[0] == pytest.approx(QUICK_UNCERTAINTY)
     assert uncertainties[1] > 1.5 * uncertainties[0]
 

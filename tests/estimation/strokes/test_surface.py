@@ -1,5 +1,6 @@
 """The surface of synthetic mud: how well it is found, whether its uncertainty is right, and what is no surface."""
 
+from functools import cache
 from math import e, inf, nan, sqrt
 from typing import NamedTuple
 
@@ -46,6 +47,7 @@ class Scores(NamedTuple):
     errors_of_k: Array
 
 
+@cache
 def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 400) -> Scores:
     """Return the errors over many insertions into mud whose force is a jump plus a slope."""
     errors_mm, reported_mm, covered, of_k = [], 0.0, 0, []

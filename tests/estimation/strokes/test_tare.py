@@ -29,9 +29,17 @@ def swing(count: int = 100) -> list[tuple[float, float]]:
     return [(pi / 6.0 * sin(pi * (i / count - 0.5)), 0.2 * cos(pi * i / count)) for i in range(count)]
 
 
+def again(tare: Tare, poses: list[tuple[float, float]], weight_n: float, is_air: bool = True) -> Tare:
+    """Take the zero of another stride."""
+    hang(tare, poses, weight_n)
+    tare.set_zero(is_air=is_air)
+    return tare
+
+
 def taken(poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0.0, seed: int = 1) -> Tare:
     tare = Tare()
     hang(tare, poses, weight_n, noise_nm, seed)
+    assert tare.zero == Zero()  # it takes effect when it is taken
     tare.set_zero()
     return tare
 
@@ -41,14 +49,6 @@ def test_a_weight_is_found_in_any_pose(weight_n: float) -> None:
     zero = taken(swing(), weight_n).zero
     assert zero.weight_n == pytest.approx(weight_n, abs=EXACT)
     assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_zero_takes_effect_when_it_is_taken() -> None:
-    tare = Tare()
-    hang(tare, swing(), WEIGHT_N)
-    assert tare.zero == Zero()
-    tare.set_zero()
-    assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
 
 
 def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
@@ -76,44 +76,25 @@ def test_mud_that_drips_off_is_followed() -> None:
     """The end of the swing counts: after 3 MEMORY samples the weight before has faded to e⁻³."""
     tare = Tare()
     hang(tare, [(0.0, 0.1)] * 100, 2.0)
-    hang(tare, [(0.0, 0.1)] * 3 * MEMORY, 0.5)
-    tare.set_zero()
-    assert 0.5 < tare.zero.weight_n < 0.5 + 1.5 * 0.06
+    assert 0.5 < again(tare, [(0.0, 0.1)] * 3 * MEMORY, 0.5).zero.weight_n < 0.5 + 1.5 * 0.06
 
 
 @pytest.mark.parametrize("count", range(FEWEST))
-def test_a_stride_with_hardly_any_air_keeps_the_zero_of_the_one_before(count: int) -> None:
+def test_a_stride_with_hardly_any_air_keeps_the_zero_of_the_one_before_and_does_not_count_for_the_next(
+    count: int,
+) -> None:
     tare = taken(swing(), WEIGHT_N)
     before = tare.zero
-    hang(tare, swing()[:count], 5.0)
-    tare.set_zero()
-    assert tare.zero == before
+    assert again(tare, swing()[:count], 100.0).zero == before
+    assert again(tare, swing(), 0.3).zero.weight_n == pytest.approx(0.3)
 
 
-def test_too_little_air_does_not_count_for_the_next_stride() -> None:
-    tare = taken(swing(), WEIGHT_N)
-    hang(tare, swing()[:3], 100.0)
-    tare.set_zero()
-    hang(tare, swing(), 0.3)
-    tare.set_zero()
-    assert tare.zero.weight_n == pytest.approx(0.3)
-
-
-def test_the_drift_is_the_change_from_stride_to_stride() -> None:
+def test_the_drift_is_the_change_from_stride_to_stride_without_the_correction_in_the_insertion() -> None:
     tare = taken(swing(), 1.5)
     assert not isfinite(tare.drift_n)
-    for weight_n, drift_n in ((1.1, -0.4), (1.2, 0.1)):
-        hang(tare, swing(), weight_n)
-        tare.set_zero()
-        assert tare.drift_n == pytest.approx(drift_n)
-
-
-def test_a_correction_in_the_insertion_does_not_change_the_drift() -> None:
-    tare = taken(swing(), 1.0)
-    tare.correct(0.5, 0.001)
-    hang(tare, swing(), 1.0)
-    tare.set_zero()
-    assert tare.drift_n == pytest.approx(0.0, abs=EXACT)
+    for weight_n, drift_n in ((1.1, -0.4), (1.2, 0.1), (1.2, 0.0)):
+        assert again(tare, swing(), weight_n).drift_n == pytest.approx(drift_n, abs=EXACT)
+        tare.correct(0.5, 0.001)
 
 
 @given(st.floats(-1.0, 1.0), st.floats(1e-4, 1.0))
@@ -131,20 +112,16 @@ def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: fl
 
 
 def test_a_swing_through_mud_keeps_the_weight_and_widens_its_error() -> None:
-    tare = taken(swing(), WEIGHT_N)
-    hang(tare, swing(), 3.0)
-    tare.set_zero(is_air=False)
-    assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
-    assert tare.zero.std_error_n == pytest.approx(UNSEEN_N)
+    zero = again(taken(swing(), WEIGHT_N), swing(), 3.0, is_air=False).zero
+    assert zero.weight_n == pytest.approx(WEIGHT_N)
+    assert zero.std_error_n == pytest.approx(UNSEEN_N)
 
 
 def test_a_reset_forgets_the_zero_and_what_is_gathered() -> None:
     tare = taken(swing(), WEIGHT_N)
     hang(tare, swing(), 5.0)
     tare.reset()
-    assert tare.zero == Zero()
-    tare.set_zero()
-    assert tare.zero == Zero()
+    assert tare.zero == again(tare, [], 0.0).zero == Zero()
     assert not isfinite(tare.drift_n)
 
 
