@@ -55,13 +55,6 @@ Motion = tuple[
 ]  # for each time step: the plates' swept distance, and their depth as a fraction of the stance's
 
 
-def step_m(
-    gait: GaitParameters, geometry: FlipperGeometry, drag: BodyDrag, traction: Traction, depth_m: float
-) -> float:
-    """Return the step with the flippers at `depth_m`, extracted at the gait's speed."""
-    return carried_m(motion_of(gait, geometry, depth_m), drag, traction)
-
-
 @lru_cache(maxsize=256)
 def motion_of(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> Motion:
     """Return the motion of the plates from the start of the stance until they are out."""

@@ -242,42 +242,6 @@ def test_a_plate_above_the_mud_is_dry(
     assert stance_moment_m4(geometry, plate) == stroke_moment_m4(geometry, plate, sweep) == 0.0
 
 
-GOLDEN = {  # sweep, adduction, surface: the integrals and the joints' moments, from before plates had other shapes
-    (0.0, -0.41903952430809965, 0.0): (
-        (0.0008210358914259373, 5.799752855866767e-07, 1.3611165291637947e-05)
-        + (1.243352949040879e-05, 1.7399258567600304e-08, 1.38694984745305e-07),
-        (1.509422797416655e-06, 4.1133240858223993e-07, -0.0),
-    ),
-    (-0.5, -0.9384752447687668, 0.0): (
-        (0.001749942070584595, 7.181121205595786e-10, 6.124595213426096e-05)
-        + (5.13001108731797e-05, 6.452289276210746e-08, 1.373171939551732e-06),
-        (6.2205361975436705e-06, 7.428849539509415e-07, 0.09185630457408762),
-    ),
-    (0.5, -0.1533572654973197, 0.0): (
-        (2.7020059975460703e-05, 1.5798153989542406e-07, 2.438546844615212e-08)
-        + (2.409927578608387e-08, 1.8098840804507695e-10, 1.6312106536506102e-11),
-        (3.072901502375141e-09, 1.2812733117940217e-08, -0.18545012678838574),
-    ),
-    (0.3, -0.4, -0.04): (
-        (0.0017374861395913546, 1.2358814228663515e-07, 6.0387292194893406e-05)
-        + (5.944043250142077e-05, 3.3779924376656716e-08, 1.4226581351233621e-06),
-        (7.166631824547149e-06, 8.036161486330695e-07, -0.06388889926988872),
-    ),
-}
-
-
-@pytest.mark.parametrize("pose", GOLDEN)
-def test_the_papers_rectangle_keeps_its_moments_to_the_last_digit(pose: tuple[float, float, float]) -> None:
-    integrals, moments = GOLDEN[pose]
-    plate, sweep_rad = submerged_plate(AUTHORS, *pose), pose[0]
-    assert plate == integrals
-    assert moments == (
-        stance_moment_m4(AUTHORS, plate),
-        stroke_moment_m4(AUTHORS, plate, sweep_rad),
-        cross_coupling(AUTHORS, plate, sweep_rad),
-    )
-
-
 # other shapes
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from control.depth.depth_choice import DepthAdaptation, DepthChoice
 from control.depth.forecast import GRID_M, DepthForecast
-from control.depth.step_model import BodyDrag, Traction, step_m
+from control.depth.step_model import BodyDrag, Traction, carried_m, motion_of
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
@@ -57,7 +57,7 @@ def duration_s(depth_m: float) -> float:
 def predicted_m(thrust_n: float, k_s: float, depth_m: float) -> float:
     """Return the predicted step of a body whose pad of 1.5 cm drags 2 cm deep through the same mud."""
     drag = BodyDrag(2.5 + k_s * 0.015 * 0.02**2 / 2.0, 6.0, 1.0)
-    return step_m(GAIT, GEOMETRY, drag, Traction(thrust_n, 2.0 * MOTOR_FORCE_N, 2.0 * 250.0), depth_m)
+    return carried_m(motion_of(GAIT, GEOMETRY, depth_m), drag, Traction(thrust_n, 2.0 * MOTOR_FORCE_N, 2.0 * 250.0))
 
 
 def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate]) -> DepthForecast:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from control.depth.depth_choice import DepthChoice, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
-from control.depth.step_model import Traction, step_m
+from control.depth.step_model import Traction, carried_m, motion_of
 from control.gait.gait import Gait, stride_duration_s
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
@@ -79,8 +79,8 @@ def brute_force(
                 continue
             yield_n, motor_n = forecast.yield_n(depth_m) or 0.0, 2.0 * PARAMETERS.motor_force_n
             traction = Traction(yield_n, motor_n, 2.0 * PARAMETERS.mobilisation_n_m)
-            carried_m = step_m(gait, GEOMETRY, drag, traction, depth_m)
-            found.append((carried_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
+            moved_m = carried_m(motion_of(gait, GEOMETRY, depth_m), drag, traction)
+            found.append((moved_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
     return sorted(found, reverse=True)
 
 
