@@ -92,20 +92,15 @@ def test_a_single_sample_closes_nothing(phase: Phase, method: Method) -> None:
 # one bad stroke in a good walk
 
 
-def with_values(*values: float) -> Callable[[list[Row]], list[Row]]:
-    """Return an alteration of the last columns: currents, or angles and currents."""
-    return lambda rows: [(*row[: 6 - len(values)], *values) for row in rows]
-
-
 ALTERATIONS: dict[str, Callable[[list[Row]], list[Row]]] = {
-    "emptied": with_values(nan, nan, nan, nan),
+    "emptied": lambda rows: [(*row[:2], nan, nan, nan, nan) for row in rows],
     "without angles": lambda rows: [(*row[:2], nan, nan, *row[4:]) for row in rows],
-    "without currents": with_values(nan, nan),
+    "without currents": lambda rows: [(*row[:4], nan, nan) for row in rows],
     "held still": lambda rows: [(*row[:2], *rows[-1][2:]) for row in rows],
     "pressed against its limit": lambda rows: [(*row[:2], *rows[-1][2:4], -10.0, -10.0) for row in rows],
     "single": lambda rows: rows[-1:],
     "few": lambda rows: rows[:: len(rows) // 2],
-    "without load": with_values(0.0, 0.0),
+    "without load": lambda rows: [(*row[:4], 0.0, 0.0) for row in rows],
     "drawn along": lambda rows: [(*row[:4], -row[4], -row[5]) for row in rows],  # the force helps the motion
 }
 
