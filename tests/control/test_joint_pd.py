@@ -16,7 +16,6 @@ from control.joint_pd import (
     joint_torques_nm,
     largest_damping_nm_s_rad,
     largest_stiffness_nm_rad,
-    pd_torque_nm,
     phase_margin_rad,
 )
 from control.parameters.arm_mass import ArmMass
@@ -76,13 +75,6 @@ def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: in
     expected = [0.0] * 4
     expected[joint] = (0.8 + 0.12) if joint % 2 == 0 else (1.0 + 0.16)
     assert torques == pytest.approx(expected)
-
-
-def test_the_torque_opposes_the_error_in_angle_and_in_velocity() -> None:
-    target = JointTarget(0.0, 0.0)
-    assert pd_torque_nm(target, DriveState(angle_rad=0.1, velocity_rad_s=0.0), 8.0, 0.06) == pytest.approx(-0.8)
-    assert pd_torque_nm(target, DriveState(angle_rad=0.0, velocity_rad_s=2.0), 8.0, 0.06) == pytest.approx(-0.12)
-    assert pd_torque_nm(target, DriveState(angle_rad=-0.1, velocity_rad_s=-2.0), 8.0, 0.06) == pytest.approx(0.92)
 
 
 @given(poses, poses, st.floats(0.0, 1.0))

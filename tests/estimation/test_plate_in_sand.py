@@ -33,16 +33,6 @@ def pushed(path: Path) -> tuple[np.ndarray, np.ndarray, float]:
     return depth_m[inside], force_n[inside], pi * diameter_m**2 / 4.0
 
 
-def best_exponent(depth_m: np.ndarray, force_n: np.ndarray) -> float:
-    """Return n of force ∝ depth^n, by least squares on a grid of n."""
-
-    def squares(n: float) -> float:
-        power = depth_m**n
-        return float(np.sum((force_n - (force_n @ power) / (power @ power) * power) ** 2))
-
-    return float(min(np.arange(1.0, 2.0, 0.005), key=squares))
-
-
 @pytest.mark.parametrize("path", RUNS, ids=lambda path: path.name.removesuffix(".csv.gz"))
 def test_a_line_fits_dry_sand_as_measured(path: Path) -> None:
     depth_m, force_n, area_m2 = pushed(path)
@@ -55,4 +45,3 @@ def test_a_line_fits_dry_sand_as_measured(path: Path) -> None:
     assert 1.0 <= round(estimate.value / 1e6, 1) <= largest
     residual_n = np.sqrt(np.mean((force_n - estimate.value * area_m2 * depth_m) ** 2))
     assert 0.045 <= residual_n / force_n.max() <= 0.075
-    assert 1.33 <= best_exponent(depth_m, force_n) <= 1.625

@@ -26,6 +26,7 @@ SHAPES = {
     "paddle": FlipperGeometry(plate_corners_m=PADDLE),
     "turned": FlipperGeometry(plate_corners_m=TRAPEZOID, plate_angle_deg=15.0),
 }
+pytestmark = pytest.mark.parametrize("geometry", SHAPES.values(), ids=SHAPES)
 PIECE_M = 0.0001
 
 
@@ -71,22 +72,15 @@ def stroke(geometry: FlipperGeometry, k_n_m3: float) -> list[Batch]:
     return [p._replace(adduction_nm=k_n_m3 * moments_m4(geometry, p.sweep_rad, p.adduction_rad)[1]) for p in poses]
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_an_insertion_gives_the_known_k_p(shape: str) -> None:
-    reported = finish(fit_insertion(SHAPES[shape], stroke(SHAPES[shape], K_P), KNOWN, 0.0))
-    assert reported.valid and reported.value == pytest.approx(K_P, rel=0.005)
+def test_strokes_give_the_known_k_p_and_k_e(geometry: FlipperGeometry) -> None:
+    lowered, raised = stroke(geometry, K_P), stroke(geometry, -K_E)[::-1]
+    k_p = finish(fit_insertion(geometry, lowered, KNOWN, 0.0))
+    k_e = finish(fit_extraction(geometry, raised, KNOWN, 0.0, ScatterMemory(), raised[0].travel_m))
+    assert k_p.valid and k_e.valid
+    assert (k_p.value, k_e.value) == pytest.approx((K_P, K_E), rel=0.005)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_an_extraction_gives_the_known_k_e(shape: str) -> None:
-    raised = stroke(SHAPES[shape], -K_E)[::-1]
-    reported = finish(fit_extraction(SHAPES[shape], raised, KNOWN, 0.0, ScatterMemory(), raised[0].travel_m))
-    assert reported.valid and reported.value == pytest.approx(K_E, rel=0.005)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_a_stance_gives_the_known_k_s(shape: str) -> None:
-    geometry = SHAPES[shape]
+def test_a_stance_gives_the_known_k_s(geometry: FlipperGeometry) -> None:
     sweeps_rad = np.radians(np.linspace(30.0, -30.0, 21)).tolist()
     poses = [batch(geometry, 0.03, a, geometry.flipper_length_m * a) for a in sweeps_rad]
     pushed = [p._replace(sweep_nm=K_S * moments_m4(geometry, p.sweep_rad, p.adduction_rad)[0]) for p in poses]

@@ -25,7 +25,6 @@ from estimation.strokes.stroke_fit import (
     TORQUE_REPEATABILITY,
     UNOBSERVABLE,
     FittedStroke,
-    _slope_per_surface,
     bound_extraction,
     evaluated,
     fit_extraction,
@@ -172,29 +171,6 @@ def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> 
 
 
 # the uncertainty
-
-
-def pieces(surface_m: float, k: float = K, law: Law = as_the_law) -> tuple[list[float], list[float], list[float]]:
-    """Return the moments for a surface at `surface_m`, the torques for a surface at 0, and the depths."""
-    batches = [loaded(batch_at(travel_m), k, 0.0, law) for travel_m in depths() if travel_m > 0.004]
-    plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad, surface_m) for b in batches]
-    moments = [stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates]
-    return moments, [b.adduction_nm for b in batches], [b.travel_m - surface_m for b in batches]
-
-
-def plain_slope(surface_m: float, law: Law) -> float:
-    moments, torques, _ = (np.array(each) for each in pieces(surface_m, law=law))
-    return float(moments @ torques / (moments @ moments))
-
-
-@pytest.mark.parametrize("law", [as_the_law, supporting_at_once])
-def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
-    """The tolerance is 5 %: Φ falls only by about Φ dδ/z, since the plate leans and the centroid of its volume
-    moves.
-    """
-    numeric = (plain_slope(1e-6, law) - plain_slope(-1e-6, law)) / 2e-6
-    reported = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
-    assert reported == pytest.approx(numeric, rel=0.05)
 
 
 def systematic(estimate: Estimate) -> float:

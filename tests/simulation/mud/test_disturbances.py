@@ -13,6 +13,7 @@ from control.controller import WalkOrder
 from control.faults import FaultKind
 from control.geometry import FlipperGeometry
 from control.modes import ENERGISED, Mode
+from control.parameters.arm_mass import ArmMass
 from control.parameters.fault_bounds import FaultBounds
 from control.records import Joints
 from firmware_host.configuration.configuration import Configuration
@@ -23,7 +24,6 @@ from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import (
     CLINGING_ABOVE_EDGE_M,
     LAB,
-    NONE,
     Disturbances,
     StrokeHistory,
     clinging_torques_nm,
@@ -31,6 +31,7 @@ from simulation.mud.disturbances import (
 from simulation.mud.track import Track
 
 GEOMETRY = FlipperGeometry()
+DRY = PlantParameters(joint_coulomb_nm=0.02, arm_mass=ArmMass(arm_mass_kg=0.0))
 ABOVE_M = -0.014  # where the plate swings
 SOFT = Track([(5.0, MUDS["53.1"])])
 
@@ -177,29 +178,26 @@ def test_a_seed_repeats_its_history_after_a_reset_and_another_seed_differs() -> 
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize(("field", "joint"), [("sweep_friction_nm", 0), ("adduction_friction_nm", 1)])
-def test_friction_opposes_one_joint_in_each_direction(field: str, joint: int, direction: float) -> None:
-    """It slows a joint as much as an opposing torque of the same size."""
-    rates_rad_s = []
-    for disturbances, torque_nm in ((NONE, -0.05 * direction), (Disturbances(**{field: 0.05}), 0.0)):
-        plant = Plant(PlantParameters(disturbances=disturbances), SOFT)
-        arm = plant.arms[0]
-        arm.adduction_rad = 1.0  # far above the mud
-        arm.sweep_velocity_rad_s = arm.adduction_velocity_rad_s = 10.0 * direction
-        for _ in range(5):
-            plant.step(STEP_S, Joints(*(torque_nm if each == joint else 0.0 for each in range(4))))
-        rates_rad_s.append((arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s))
-    assert rates_rad_s[0] == pytest.approx(rates_rad_s[1])
-
-
-def test_friction_adds_to_that_of_the_plant_and_holds_a_resting_joint() -> None:
-    parameters = PlantParameters(disturbances=Disturbances(sweep_friction_nm=0.03), joint_coulomb_nm=0.02)
-    plant = Plant(parameters, SOFT)
-    for arm in plant.arms:
-        arm.adduction_rad = 1.0
-    for torque_nm, moves in ((0.0499, False), (0.0501, True)):
-        plant.step(STEP_S, Joints(torque_nm, 0.0, -torque_nm, 0.0))
-        assert [arm.sweep_velocity_rad_s != 0.0 for arm in plant.arms] == [moves, moves]
+@pytest.mark.parametrize("joint", ["sweep", "adduction"])
+def test_friction_adds_to_that_of_the_plant_and_holds_one_resting_joint(joint: str, direction: float) -> None:
+    """Above it the other torque accelerates the joint as a torque without friction does."""
+    speeds_rad_s = []
+    for friction_nm, torque_nm in ((0.05, 0.0499), (0.05, 0.06), (0.02, 0.03)):
+        disturbances = Disturbances(**{f"{joint}_friction_nm": friction_nm - 0.02})
+        parameters = PlantParameters(
+            disturbances=disturbances,
+            joint_coulomb_nm=0.02,
+            arm_mass=replace(PlantParameters().arm_mass, arm_mass_kg=0.0),
+        )
+        plant = Plant(parameters, SOFT)
+        for arm in plant.arms:
+            arm.adduction_rad = 1.0  # far above the mud
+        torques_nm = (torque_nm, 0.0) if joint == "sweep" else (0.0, torque_nm)
+        plant.step(STEP_S, Joints(*(direction * each for each in torques_nm * 2)))
+        speeds_rad_s.append([getattr(arm, f"{joint}_velocity_rad_s") for arm in plant.arms])
+    held, moved, same = speeds_rad_s
+    assert held == [0.0, 0.0] and direction * moved[0] > 0.0
+    assert moved == pytest.approx(same)
 
 
 # whole walks
