@@ -20,12 +20,12 @@ DISK = fault_of("disk_low", "")
 ALL = [LATE, STALE, HOT, QUIET, SILENT, BUG, DISK, fault_of("drive_silent", "right_sweep")]
 
 
-def ticks_standing(fault: Fault, energised: bool, energised_after: bool, clearing: bool = False) -> int:
+def ticks_standing(fault: Fault, energised: bool, energised_after: bool) -> int:
     """Return for how many ticks a fault stands after the tick in which it was present; 1001 means for ever."""
     latch = FaultLatch()
     latch.update([fault], energised)
     for tick in range(1, 1001):
-        latch.update([], energised_after, clearing)
+        latch.update([], energised_after)
         if not latch.present:
             return tick
     return 1001
