@@ -55,8 +55,10 @@ def bound(value: float, depth_m: float = 0.03) -> Coefficient:
     return reported(value, depth_m=depth_m)._replace(at_least=True)
 
 
-def measured(value: float, at_least: bool = False) -> Estimate:
-    return Estimate(value, 0.01 * value, 20, True, at_least=at_least, repeatability=0.01 * value)
+def measured(value: float, relative: float = 0.0, at_least: bool = False) -> Estimate:
+    """Return the estimate of a stride, with its relative standard error."""
+    reason = "the mud held" if at_least else ""
+    return Estimate(value, relative * value, 20, True, reason, at_least, relative * value)
 
 
 def estimated(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudEstimate:

@@ -6,7 +6,7 @@ repeatability) and the uncertainty that the stride itself reports.
 
 import pickle
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from math import exp, inf, isfinite, isnan, log, nan, sqrt
 from typing import Any, NamedTuple
 
@@ -28,18 +28,12 @@ from estimation.strokes.depth_line import (
     reading_of,
 )
 from tests.control import synthetic_muds
+from tests.control.synthetic_muds import NOT_REPORTED
+from tests.control.synthetic_muds import measured as reported
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6
 REPORTED = 0.03  # relative standard error of a stride in these tests, where there is any
-NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
-
-
-def reported(value: float, relative: float = 0.0) -> Estimate:
-    return Estimate(value, relative * value, 50, True, repeatability=relative * value)
-
-
-def bound(value: float, relative: float = 0.0) -> Estimate:
-    return Estimate(value, relative * value, 50, True, "the mud held", True, relative * value)
+bound = partial(reported, at_least=True)
 
 
 def stride(
@@ -152,7 +146,10 @@ class TestOneMud:
 
     def test_a_stride_that_hardly_knows_does_not_push_out_those_that_do(self) -> None:
         known = [K_S_KNOWN] * 20
-        before, later = found(after(*known).k_s), found(after(*known, stride(k_s=reported(1.3 * K_S, 0.5))).k_s)
+        before, later = (
+            found(after(*known).k_s),
+            found(after(*known, stride(k_s=reported(1.3 * K_S, 0.5))).k_s),
+        )
         assert later.value == pytest.approx(before.value, rel=0.01)
         assert later.std_error <= 1.07 * before.std_error
 
@@ -425,7 +422,7 @@ class TestBothFlippers:
 class TestLowerBounds:
     @pytest.mark.parametrize("valid", [True, False])
     def test_with_nothing_else_known_a_bound_is_trusted_as_a_bound(self, valid: bool) -> None:
-        k_s = found(after(stride(k_s=bound(K_S, 0.06)._replace(valid=valid), depth_m=0.04)).k_s)
+        k_s = found(after(stride(k_s=bound(K_S, relative=0.06)._replace(valid=valid), depth_m=0.04)).k_s)
         assert is_bound(k_s, K_S)
         assert k_s.depth_m == pytest.approx(0.04)
         assert k_s.std_error / k_s.value == pytest.approx(0.1)

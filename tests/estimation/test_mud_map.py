@@ -11,12 +11,8 @@ from control.records import Estimate, StrideEstimate
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
 from estimation.strokes.depth_line import REPEATABILITY
 from tests.control import synthetic_muds
-
-NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
-
-
-def reported(value: float, relative: float = 0.0, at_least: bool = False) -> Estimate:
-    return Estimate(value, relative * value, 50, True, "", at_least, relative * value)
+from tests.control.synthetic_muds import NOT_REPORTED
+from tests.control.synthetic_muds import measured as reported
 
 
 def stride(

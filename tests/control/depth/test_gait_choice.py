@@ -34,7 +34,7 @@ def estimated(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
     return MudEstimate(None, reported(k_s), reported(k_e), flipper, flipper, boundary)
 
 
-FIRM, SOFT, STICKY = estimated(2.0e6, 0.5e6), estimated(0.2e6, 0.1e6), estimated(2.0e6, 2.5e6)
+FIRM, SOFT = estimated(2.0e6, 0.5e6), estimated(0.2e6, 0.1e6)
 
 
 def strides(
@@ -253,10 +253,3 @@ def test_only_this_method_has_a_shorter_swing() -> None:
     assert quickest(PARAMETERS, GEOMETRY, GAIT).swing_duration_s == 0.3
     for method in ("default", "paper"):
         assert quickest(replace(PARAMETERS, method=method), GEOMETRY, GAIT) is GAIT
-
-
-def test_a_stuck_stride_is_not_forgotten_after_a_shallower_one() -> None:
-    adaptation = adapted()
-    held = choose_now(adaptation, STICKY, strides(released=False, depth_m=0.04), 0.04)
-    choose_now(adaptation, STICKY, strides(depth_m=0.02), 0.02)
-    assert any(each.depth_m == 0.04 for each in adaptation._stuck), held

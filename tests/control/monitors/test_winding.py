@@ -60,23 +60,6 @@ def test_a_changing_current_heats_it_like_an_integrator() -> None:
     assert exact > 40.0
 
 
-def test_copper_that_is_hotter_heats_more() -> None:
-    """The heat grows by 0.39 % per kelvin: the first step from 85 °C is compared with that from 25 °C, less what the
-    room takes.
-    """
-
-    def watts(temperature_c: float) -> float:
-        winding = Winding(PARAMETERS)
-        winding.temperature_c = temperature_c
-        rise_k = winding.update(1e-3, 5.0, nan) - temperature_c
-        to_room_k_s = (temperature_c - PARAMETERS.room_c) / PARAMETERS.time_constant_s
-        heat_k_s = rise_k / 1e-3 + to_room_k_s
-        return heat_k_s * PARAMETERS.time_constant_s / PARAMETERS.thermal_resistance_k_w
-
-    assert watts(25.0) == pytest.approx(1.5 * 0.5 * 25.0, rel=1e-3)
-    assert watts(85.0) / watts(25.0) == pytest.approx(1.0 + 0.0039 * 60.0, rel=1e-3)
-
-
 def test_it_cools_to_the_rooms_temperature_with_its_time_constant() -> None:
     winding = heated(9.0, 40000)
     rise_k = winding.temperature_c - PARAMETERS.room_c
