@@ -8,6 +8,7 @@ seed and on the key only.
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, fields
+from functools import partial
 from itertools import product
 from math import exp, log
 from random import Random
@@ -47,15 +48,16 @@ def grid_points(grid: Tables) -> Iterator[Values]:
     for key, values in lists.items():
         if not isinstance(values, list):
             raise ConfigurationError([f"grid.{key} = {shown(values)}: must be an array of values, in [brackets]"])
-    for values in product(*map(_require_values, lists.items())):
+        _require_values("grid", key, values)
+    for values in product(*lists.values()):
         yield dict(zip(lists, values, strict=True))
 
 
 def random_points(sample: Tables, points: int, seed: int) -> Iterator[Values]:
     """Raises ConfigurationError."""
-    columns = {key: _draws(key, given, Random(f"{seed} {key}")) for key, given in _flatten(sample, "random").items()}
+    draws = {key: _draw_of(key, given, Random(f"{seed} {key}")) for key, given in _flatten(sample, "random").items()}
     for _ in range(points):
-        yield {key: next(draws) for key, draws in columns.items()}
+        yield {key: draw() for key, draw in draws.items()}
 
 
 def range_ends(sample: Tables) -> Iterator[Values]:
@@ -66,23 +68,15 @@ def range_ends(sample: Tables) -> Iterator[Values]:
             yield from ({key: limits.min}, {key: limits.max})
 
 
-def _draws(key: str, given: Any, random: Random) -> Iterator[Any]:
+def _draw_of(key: str, given: Any, random: Random) -> Callable[[], Any]:
     if isinstance(given, Mapping):
-        limits = _range(key, given)
-        return _forever(lambda: limits.draw(random))
+        return partial(_range(key, given).draw, random)
     if not isinstance(given, list):
         raise ConfigurationError([f"random.{key} = {shown(given)}: must be an array, or {{ min = ..., max = ... }}"])
-    values = _require_values((key, given), "random")
-    return _forever(lambda: random.choice(values))
+    return partial(random.choice, _require_values("random", key, given))
 
 
-def _forever(draw: Callable[[], Any]) -> Iterator[Any]:
-    while True:
-        yield draw()
-
-
-def _require_values(item: tuple[str, list[Any]], section: str = "grid") -> list[Any]:
-    key, values = item
+def _require_values(section: str, key: str, values: list[Any]) -> list[Any]:
     if not values:
         raise ConfigurationError([f"{section}.{key} = []: must have at least one value"])
     return values

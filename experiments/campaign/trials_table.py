@@ -7,6 +7,7 @@ module needs the extra `data`.
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,22 +26,19 @@ ARROW_TYPES = {
 OWN = {"point": "INTEGER", "seed": "INTEGER", "sources": "VARCHAR"}
 
 
-def column_of(key: str) -> str:
-    return key.replace(".", "_")
-
-
 def write_trials(path: Path, rows: Sequence[Mapping[str, Any]], keys: Sequence[str], metadata: dict[str, str]) -> None:
     """`rows` have the catalogue's columns, `point`, `seed`, `sources` and the values by key. Raises OSError."""
-    known = [pa.field(name, ARROW_TYPES[kind]) for name, kind in (COLUMNS | OWN).items()]
-    columns = {field.name: pa.array([row[field.name] for row in rows], field.type) for field in known}
-    columns |= {column_of(key): _varied([row[key] for row in rows]) for key in keys}
+    known = pa.schema([(name, ARROW_TYPES[kind]) for name, kind in (COLUMNS | OWN).items()])
+    table = pa.Table.from_pylist(rows, known)
+    for key in keys:
+        table = table.append_column(key.replace(".", "_"), _varied([row[key] for row in rows]))
     with whole_file(path) as hidden:
-        pq.write_table(pa.table(columns).replace_schema_metadata(metadata), hidden, compression="zstd")
+        pq.write_table(table.replace_schema_metadata(metadata), hidden, compression="zstd")
 
 
 def _varied(values: Sequence[Any]) -> pa.Array:
     """Return numbers, words or truth values as they are, and any other value, or a mixture of them, as JSON."""
-    for kind in (bool, int, int | float, str):
-        if all(isinstance(value, kind) and (kind is bool or not isinstance(value, bool)) for value in values):
-            return pa.array(values, pa.float64() if kind == int | float else None)
+    if all(isinstance(value, int | float | str) for value in values):
+        with suppress(pa.ArrowInvalid, pa.ArrowTypeError):
+            return pa.array(values)
     return pa.array([json.dumps(value) for value in values], pa.string())

@@ -48,8 +48,9 @@ def study(trials: Trials, file: Annotated[Path, Option("in TOML, such as example
         for measured in trials.measured:
             _write(campaign, measured, trials.folder / TRIALS)
         trials.measured.clear()  # there is no second file of results
-    by_point = walked.groupby("point")
-    points = [_point_result(values, own) for values, (_, own) in zip(campaign.points, by_point, strict=True)]
+    points = [
+        _point_result(values, own) for values, (_, own) in zip(campaign.points, walked.groupby("point"), strict=True)
+    ]
     summary = {
         "campaign": campaign.name,
         "trials": len(rows),
@@ -60,7 +61,7 @@ def study(trials: Trials, file: Annotated[Path, Option("in TOML, such as example
         "simulated": True,
     }
     figure = Figure("speeds", SPEEDS, partial(draw_speeds, points), "Speed against each key")
-    return Result([_table(points, len(rows))], [figure], summary=summary, title=f"Campaign {campaign.name}")
+    return Result([_table(points, len(rows))], [figure], summary, f"Campaign {campaign.name}")
 
 
 def walk_point(point: int, seed: int, values: Values, base: Tables, plates: Plates) -> dict[str, Any]:
@@ -99,22 +100,17 @@ def _point_result(values: Values, walked: DataFrame) -> dict[str, Any]:
 def _table(points: list[dict[str, Any]], walks: int) -> Table:
     shown, which = points, ""
     if len(points) > SHOWN_POINTS:
-        shown = sorted(points, key=lambda point: -(point["speed_m_s"] if point["speed_m_s"] > 0.0 else 0.0))[
-            :SHOWN_POINTS
-        ]
+        shown = sorted(points, key=lambda point: -max(0.0, point["speed_m_s"]))[:SHOWN_POINTS]  # NaN is no speed
         which = f", the fastest {SHOWN_POINTS}"
-    rows = [
-        point["values"]
-        | {
-            "speed": number(100.0 * point["speed_m_s"], 2),
-            "sd": number(100.0 * point["speed_sd_m_s"], 2),
-            "strides": point["strides"],
-            "stuck": point["stuck_strides"],
-            "faults": ", ".join(
-                [*point["faults"], *([f"{point['not_started']} not started"] if point["not_started"] else [])]
-            ),
-        }
-        for point in shown
-    ]
+    rows = []
+    for point in shown:
+        not_started = [f"{point['not_started']} not started"] * bool(point["not_started"])
+        speeds = {"speed": point["speed_m_s"], "sd": point["speed_sd_m_s"]}
+        rows.append(
+            point["values"]
+            | {name: number(100.0 * speed_m_s, 2) for name, speed_m_s in speeds.items()}
+            | {"strides": point["strides"], "stuck": point["stuck_strides"]}
+            | {"faults": ", ".join([*point["faults"], *not_started])}
+        )
     title = f"{counted(walks, 'walk')} at {counted(len(points), 'point')}{which}; all are in {TRIALS}"
     return Table("points", title, {"speed": "cm/s"}, DataFrame(rows), "Points")
