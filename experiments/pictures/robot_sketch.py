@@ -1,5 +1,7 @@
 """Draws the robot from the side at one row of a walk: body, arm and plate at their measured positions."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
@@ -35,8 +37,9 @@ def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
     return view_from_side(walk.geometry, sweep_rad, adduction_rad, body_position_m(walk, row) + origin_m)
 
 
-def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> None:
-    view, colour = view_of(walk, row, origin_m), FLIPPER_COLOURS[walk.flipper]
+def draw_robot(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) -> None:
+    """Draw the robot at the last of these rows, and the path of the plate's lower edge over all of them."""
+    view, colour = view_of(walk, rows[-1], origin_m), FLIPPER_COLOURS[walk.flipper]
     _draw_body(panel, *view.shoulder)
     panel.add_patch(Polygon(view.plate, facecolor=colour, edgecolor=colour, linewidth=1.0, joinstyle="round"))
     panel.plot(*zip(view.shoulder, view.wrist, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")
@@ -45,26 +48,15 @@ def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> No
     panel.add_patch(veil)
     (left_m, right_m), (low_m, _) = panel.get_xlim(), panel.get_ylim()
     veil.set_clip_path(Rectangle((left_m, low_m), right_m - left_m, -low_m, transform=panel.transData))
+    edges = [view_of(walk, row, origin_m).edge for row in rows]
+    panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)
 
 
 def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
     """Draw the body around its shoulder, with an eye in front."""
-    left_m, low_m = x_m - BODY_LENGTH_M / 2.0, z_m - BODY_HEIGHT_M / 2.0
-    outline = FancyBboxPatch(
-        (left_m + CORNER_M, low_m + CORNER_M),
-        BODY_LENGTH_M - 2.0 * CORNER_M,
-        BODY_HEIGHT_M - 2.0 * CORNER_M,
-        boxstyle=f"round,pad={CORNER_M}",
-        facecolor=BODY,
-        edgecolor=FAINT,
-        linewidth=1.2,
-    )
-    panel.add_patch(outline)
-    eye = (x_m + BODY_LENGTH_M / 2.0 - CORNER_M, z_m + BODY_HEIGHT_M / 2.0 - 0.75 * CORNER_M)
+    inner_m = np.array([BODY_LENGTH_M, BODY_HEIGHT_M]) - 2.0 * CORNER_M  # between the centres of the corners
+    left_m, low_m = np.array([x_m, z_m]) - inner_m / 2.0
+    look: dict[str, Any] = {"facecolor": BODY, "edgecolor": FAINT, "linewidth": 1.2}
+    panel.add_patch(FancyBboxPatch((left_m, low_m), *inner_m, boxstyle=f"round,pad={CORNER_M}", **look))
+    eye = (x_m + inner_m[0] / 2.0, z_m + inner_m[1] / 2.0 + 0.25 * CORNER_M)
     panel.add_patch(Circle(eye, EYE_M, color=INK))
-
-
-def draw_trail(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) -> None:
-    """Draw the path of the plate's lower edge."""
-    edges = [view_of(walk, row, origin_m).edge for row in rows]
-    panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)

@@ -34,6 +34,10 @@ class Outcome(StrEnum):
     GOOD = "good"
     UNKNOWN = "unknown"  # its length is not known without a pose
 
+    @property
+    def of_stride(self) -> str:
+        return "stride" if self is Outcome.UNKNOWN else f"{self} stride"
+
 
 class Moment(NamedTuple):
     caption: str

@@ -13,8 +13,8 @@ from PIL import Image  # comes with matplotlib
 
 from control.records import Phase
 from experiments.pictures.recorded_walk import RecordedWalk
-from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of
-from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, prepare, view_of
+from experiments.pictures.stride_choice import Stride, outcome_of, rows_of
 from experiments.reports.style import FORCE, INK, OUTCOME_COLOURS, SURFACE
 from logs.files.whole_files import whole_file
 
@@ -91,8 +91,7 @@ def _draw_frame(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> No
         panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
         corner = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
         panel.text(*corner, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
-    draw_robot(panel, walk, row, 0.0)
-    draw_trail(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
+    draw_robot(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
     _draw_force(panel, walk, row)
     _draw_texts(panel, walk, stride, row)
 
@@ -109,11 +108,9 @@ def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:
 
 def _draw_texts(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
     outcome = outcome_of(stride, walk.geometric_step_m)
-    name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
-    phase = Phase(int(walk.phase[row])).name.lower()
     texts = {
-        0.02: (f"{name} {stride['index']}", OUTCOME_COLOURS[outcome]),
-        0.30: (phase, INK),
+        0.02: (f"{outcome.of_stride} {stride['index']}", OUTCOME_COLOURS[outcome]),
+        0.30: (Phase(int(walk.phase[row])).name.lower(), INK),
         0.48: (f"depth {100.0 * walk.depth_m[row]:.1f} cm", INK),
         0.70: (f"force {hypot(*_force_n(walk, row)):.1f} N", FORCE),
         0.88: (f"{walk.time_s[row]:.1f} s", INK),

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.pictures.recorded_walk import RecordedWalk
-from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare
-from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, prepare
+from experiments.pictures.stride_choice import MOMENTS, Stride, moments_of, outcome_of, rows_of
 from experiments.reports.style import INK, OUTCOME_COLOURS
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # range of a row below and above the surface
@@ -56,17 +56,15 @@ def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequenc
     _draw_title(panel, walk, stride)
     for caption, row in moments_of(walk, stride):
         begin_m = captions.index(caption) * SPACING_M
-        draw_robot(panel, walk, row, begin_m - start_m)
-        draw_trail(panel, walk, range(first, row + 1), begin_m - start_m)
+        draw_robot(panel, walk, range(first, row + 1), begin_m - start_m)
         if np.all(np.isfinite(walk.body_x_m[[first, row]])):
             _draw_advance(panel, begin_m, body_position_m(walk, row) - start_m)
 
 
 def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
     outcome, corner = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
-    name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
     details = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
-    title = panel.annotate(name, corner, weight="bold", size=15, color=OUTCOME_COLOURS[outcome])
+    title = panel.annotate(outcome.of_stride, corner, weight="bold", size=15, color=OUTCOME_COLOURS[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
     panel.annotate(details, (1, corner[1]), size=12, color=INK, **after)
 

@@ -23,6 +23,7 @@ from experiments.reports.value_text import N_CM3
 from experiments.run_report.results import SPEED, Entry, run_labels
 from experiments.run_report.run import Run
 
+Floats = NDArray[np.float64]
 CM4, N_CM = 1e8, 100.0  # in m⁴, and in N·m
 MOST_DRAWN = 10  # strides of each mud, evenly over the run
 MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
@@ -51,14 +52,15 @@ def draw_fits(run: Run) -> Figure:
     axes = figure.subplots(len(COEFFICIENTS), 2 * len(flippers), squeeze=False)
     fitted = run.estimates[run.estimates["samples"].notna() & run.estimates["mud"].isin(muds)]
     for row, name in zip(axes, COEFFICIENTS, strict=True):
+        drawn = []
         for fit, residuals, flipper in zip(row[::2], row[1::2], flippers, strict=True):
             own = fitted[(fitted["coefficient"] == name) & (fitted["flipper"] == flipper)]
-            _draw_samples(fit, residuals, own, looks, along_stroke=name == "k_s")
+            drawn.append(_draw_samples(fit, residuals, own, looks, along_stroke=name == "k_s"))
             fit.set_title(f"{LABELS[name]}, {flipper}")
             residuals.set_title("residuals")
-        _share_scales(row)
+        for panels, heights in zip((row[::2], row[1::2]), zip(*drawn, strict=True), strict=True):
+            _share_scales(panels, heights)
         row[0].set_ylabel("torque (N·cm)")
-    for row, name in zip(axes, COEFFICIENTS, strict=True):
         for panel in row:
             panel.set_xlabel("part of the stroke (%)" if name == "k_s" else "moment (cm⁴)")
     handles = [axes[0, 0].plot([], [], **looks[mud], label=mud.replace("k_p", "$k_p$"))[0] for mud in muds]
@@ -69,27 +71,34 @@ def draw_fits(run: Run) -> Figure:
 
 def _draw_samples(
     fit: Axes, residuals: Axes, fitted: DataFrame, looks: Mapping[str, dict[str, Any]], along_stroke: bool
-) -> None:
-    """Draw all strides of a mud as one artist of each kind: one of its own takes ten kilobytes."""
+) -> tuple[Floats, Floats]:
+    """Draw all strides of a mud as one artist of each kind: one of its own takes ten kilobytes.
+
+    Return the torques and the residuals that were drawn, in N·cm.
+    """
+    drawn = [(np.empty(0), np.empty(0))]
     for mud, all_samples in fitted.groupby("mud", sort=False)["samples"]:
         chosen = np.unique(np.linspace(0, len(all_samples) - 1, MOST_DRAWN).round().astype(int))
         samples = [all_samples.iloc[number] for number in chosen]
         places = [_percent_of_stroke(each) if along_stroke else CM4 * np.asarray(each.moments_m4) for each in samples]
         lines = [_fitted_line(*each, along_stroke) for each in zip(samples, places, strict=True)]
-        torques, remains = (np.concatenate([getattr(each, name) for each in samples]) for name in DRAWN_OF_FIT)
-        fit.plot(np.concatenate(places), N_CM * torques, **looks[str(mud)])
+        torques, remains = (N_CM * np.concatenate([getattr(each, name) for each in samples]) for name in DRAWN_OF_FIT)
+        fit.plot(np.concatenate(places), torques, **looks[str(mud)])
         fit.plot(*np.hstack(lines), color=looks[str(mud)]["color"], linewidth=0.8)
-        residuals.plot(np.concatenate(places), N_CM * remains, **looks[str(mud)])
+        residuals.plot(np.concatenate(places), remains, **looks[str(mud)])
+        drawn.append((torques, remains))
     residuals.axhline(0.0, color=FAINT, linewidth=0.8)
+    torques, remains = map(np.concatenate, zip(*drawn, strict=True))
+    return torques, remains
 
 
-def _percent_of_stroke(samples: FitSamples) -> NDArray[np.float64]:
+def _percent_of_stroke(samples: FitSamples) -> Floats:
     """Return the middle of each batch of travel on the way of all of them."""
     ends_m = np.cumsum(samples.weights_m)
     return np.asarray(100.0 * (ends_m - np.asarray(samples.weights_m) / 2.0) / ends_m[-1])
 
 
-def _fitted_line(samples: FitSamples, places: NDArray[np.float64], along_stroke: bool) -> tuple[Any, Any]:
+def _fitted_line(samples: FitSamples, places: Floats, along_stroke: bool) -> tuple[Any, Any]:
     """Return the fitted torque at the samples, or the line from the origin; NaN parts it from the next one."""
     if along_stroke:
         fitted_nm = np.subtract(samples.torques_nm, samples.residuals_nm)
@@ -97,24 +106,16 @@ def _fitted_line(samples: FitSamples, places: NDArray[np.float64], along_stroke:
     return [0.0, max(places), nan], [0.0, samples.slope / N_CM3 * max(places), nan]
 
 
-def _share_scales(row: Sequence[Axes]) -> None:
-    """Give fits, and residuals, of both flippers the same scales."""
-    for panels in (row[::2], row[1::2]):
-        for panel in panels[1:]:
-            panel.sharex(panels[0])
-            panel.sharey(panels[0])
-        panels[0].autoscale()
-        heights = [
-            [np.asarray(line.get_ydata(), dtype=float) for line in panel.lines if line.get_marker() != "None"]
-            for panel in panels
-        ]
-        if any(heights):
-            _cut_outliers(panels, [np.concatenate(own or [np.empty(0)]) for own in heights])
-
-
-def _cut_outliers(panels: Sequence[Axes], heights: Sequence[NDArray[np.float64]]) -> None:
-    """Leave single samples far off out of the picture, and count them in it."""
-    low, high = np.percentile(np.concatenate(heights), [INSIDE, 100.0 - INSIDE])
+def _share_scales(panels: Sequence[Axes], heights: Sequence[Floats]) -> None:
+    """Give the panels of both flippers the same scales; leave single samples far off out, and count them."""
+    for panel in panels[1:]:
+        panel.sharex(panels[0])
+        panel.sharey(panels[0])
+    panels[0].autoscale()
+    joined = np.concatenate(heights)
+    if not len(joined):
+        return
+    low, high = np.percentile(joined, [INSIDE, 100.0 - INSIDE])
     bottom, top = panels[0].get_ylim()
     room = BEYOND * (high - low)
     bottom, top = max(bottom, float(low - room)), min(top, float(high + room))
