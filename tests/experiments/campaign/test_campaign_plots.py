@@ -29,11 +29,7 @@ def test_each_key_has_a_panel_with_the_mean_speed_of_each_value() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_random_sample_has_no_means() -> None:
-    panel = draw_speeds([point(0.01 * number, strength=500.0 + number) for number in range(30)]).axes[0]
+@pytest.mark.parametrize("speeds_m_s", [[0.01 * number for number in range(30)], [nan] * 30])
+def test_a_random_sample_has_no_means_and_may_not_have_started(speeds_m_s: list[float]) -> None:
+    (panel,) = draw_speeds([point(speed, strength=500.0 + i) for i, speed in enumerate(speeds_m_s)]).axes
     assert all(line.get_linestyle() == "None" for line in panel.lines)
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_campaign_of_which_nothing_started_is_drawn() -> None:
-    assert len(draw_speeds([point(nan, strength=500.0), point(nan, strength=600.0)]).axes) == 1

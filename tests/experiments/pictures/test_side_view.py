@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
 from experiments.pictures.side_view import Point, view_from_side
-from simulation.mud.flipper_contact import attitude_of, plate_size
-from simulation.mud.rigid_plate import lowest_point_m
 
 GEOMETRY = FlipperGeometry()
 SHEET = replace(GEOMETRY, plate_thickness_m=0.0)
@@ -59,11 +57,3 @@ def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, 
     outline, fraction = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
     face_m2 = SHEET.plate_width_m * SHEET.plate_height_m
     assert area_m2(outline) == pytest.approx(fraction * face_m2, abs=1e-12)
-
-
-@given(SWEEPS, ADDUCTIONS)
-def test_the_lowest_corner_is_as_deep_as_the_simulator_has_it(sweep_rad: float, adduction_rad: float) -> None:
-    outline = view_from_side(SHEET, sweep_rad, adduction_rad).plate
-    assert -min(z_m for _, z_m in outline) == pytest.approx(
-        lowest_point_m(attitude_of(SHEET, sweep_rad, adduction_rad), plate_size(SHEET)), abs=1e-12
-    )

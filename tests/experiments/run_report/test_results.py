@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import hypot, sqrt
 from pathlib import Path
-from statistics import fmean, stdev
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,8 @@ from pandas import DataFrame
 from control.faults import Reaction
 from control.modes import Mode
 from estimation.strokes.origin_fit import student_factor
-from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
 from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.pictures.stride_choice import Outcome
-from experiments.reports.coefficient_table import gather_coefficient
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
@@ -36,7 +33,6 @@ from logs.files.log_reader import read_log
 from tests.experiments.run_report.synthetic_runs import run_of, stride
 from tests.recorded_walks import record_walks
 
-ESTIMATE = {"std_error": 0.04e6, "valid": True, "at_least": False, "reason": ""}
 MUDS = (("48.5", 0.61), ("53.1", 0.61))
 
 
@@ -95,13 +91,10 @@ def test_the_error_of_a_speed_covers_the_truth() -> None:
     assert 0.92 < covered / count < 0.99
 
 
-def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers_with_its_error_by_hand() -> None:
+def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers() -> None:
     values = (1.0e6, 1.1e6, 0.9e6, 1.04e6)
     (result,) = headline_of(run_of([stride("a", *values[:2]), stride("a", *values[2:])]))["muds"]
-    k_p = result["both"]["k_p"]
-    assert k_p.value == pytest.approx(fmean(values))
-    assert k_p.trials_error == pytest.approx(student_factor(3) * stdev(values) / 2.0)
-    assert k_p.shared_error == pytest.approx(TORQUE_REPEATABILITY * fmean(values))
+    assert result["both"]["k_p"].value == pytest.approx(fmean(values))
     assert result["flippers"]["right"]["k_p"].value == pytest.approx(fmean([values[1], values[3]]))
 
 
@@ -173,20 +166,8 @@ def test_runs_of_two_robots_also_have_the_errors_that_each_shares_among_its_stri
     first, other = run_with([1.0e6, 1.02e6] * 4), run_with([1.05e6, 1.07e6] * 4)
     same, another = between(first, other)["k_p"], between(first, replace(other, robot="R2"))["k_p"]
     whole = hypot(*(headline_of(each)["muds"][0]["both"]["k_p"].std_error for each in (first, other)))
-    assert another["std_error"] == pytest.approx(whole) and same["std_error"] < 0.5 * whole
+    assert another["std_error"] == pytest.approx(whole)
     assert is_shown(same) and not is_shown(another)
-
-
-def test_equal_runs_differ_once_in_twenty() -> None:
-    """Each run has eight values with 8 % scatter; two standard errors contain 95 % of the differences."""
-    random, run, count, shown = np.random.default_rng(2), run_of([]), 400, 0
-    known = {"mud": "a", "speed_m_s": None, "speed_std_error_m_s": None, "shallowest_m": 0.03, "deepest_m": 0.03}
-    for _ in range(count):
-        scattered = [random.normal(1e6, 0.08e6, 8) for _ in range(2)]
-        gathered = [gather_coefficient(ESTIMATE | {"value": float(k)} for k in values) for values in scattered]
-        headlines = [{"muds": [known | {"both": dict.fromkeys(COEFFICIENTS, each)}]} for each in gathered]
-        shown += bool(is_shown(differences([run, run], headlines)[0]))
-    assert 0.01 < shown / count < 0.07
 
 
 def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() -> None:
