@@ -41,12 +41,13 @@ def usage_error(message: str) -> CommandError:
 
 def report(problem: Exception) -> int:
     """Print why a command ended and return its exit status. Raise an error that is not expected again."""
-    messages, status = _explain(problem)
+    messages, status = explain(problem)
     complain(*messages)
     return status
 
 
-def _explain(problem: Exception) -> tuple[Sequence[str], int]:
+def explain(problem: Exception) -> tuple[Sequence[str], int]:
+    """Return the messages and the exit status of an error. Raise one that is not expected again."""
     text = str(problem)
     match problem:
         case CommandError():

@@ -143,7 +143,8 @@ def build_parser(given: Sequence[str] = ()) -> Parser:
 def complete(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     """Add the options of all commands, for documentation and completion, and return them."""
     if isinstance(parser, Parser):
-        parser.add_target()
+        with suppress(ModuleNotFoundError):  # of an extra; the command itself says which
+            parser.add_target()
     found = [*parser._actions]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):

@@ -13,7 +13,6 @@ import argparse
 import json as json_text  # `json` is an option
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -62,16 +61,15 @@ class StudyCommand:
 
     def functions(self) -> Iterator[Function]:
         """Yield the functions that declare its options: its own, and those of this module that it needs."""
-        with suppress(ModuleNotFoundError):  # of an extra; the command itself says which
-            module = load_study(self.name)
-            own = [module.study, *filter(None, [getattr(module, "robot", None)])]
-            yield from own
-            if not has_files(module.study):
-                yield chosen_function
-            if any(map(takes_session, own)) and getattr(module, "HAS_ROBOT", True):
-                yield make_session
-            if not takes_session(module.study):
-                yield make_workers
+        module = load_study(self.name)
+        own = [module.study, *filter(None, [getattr(module, "robot", None)])]
+        yield from own
+        if not has_files(module.study):
+            yield chosen_function
+        if any(map(takes_session, own)) and getattr(module, "HAS_ROBOT", True):
+            yield make_session
+        if not takes_session(module.study):
+            yield make_workers
         yield write_page
         yield open_folder
 

@@ -20,9 +20,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from command_line import exit_codes
 from command_line.live.own_page import own_page
-from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion
-from command_line.watch.orders import send_order
+from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion, send_order
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
@@ -214,7 +214,9 @@ class _Handler(BaseHTTPRequestHandler):
         if refused:
             self._answer(HTTPStatus.FORBIDDEN, f"{TORQUE_UNKNOWN}. stop refused: {refused}".encode())
         elif self.path == "/stop":
-            self._answer(*stop_robot(self.server.status_socket))
+            ended = end_motion(self.server.status_socket, "stop")
+            status = HTTPStatus.OK if ended.status == exit_codes.OK else HTTPStatus.CONFLICT
+            self._answer(status, ended.answer.encode())
         elif self.path == "/can_stop":
             self._answer(*self.server.status.answer())
         elif self.path in ("/note", "/mark"):
@@ -247,12 +249,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not printed."""
-
-
-def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
-    """Wait until every drive has confirmed the stop, as `mudskipper stop` does."""
-    answer = end_motion(status_socket, "stop")
-    return HTTPStatus.OK if answer.confirmed else HTTPStatus.CONFLICT, answer.text.encode()
 
 
 def ask_status(status_socket: Path) -> tuple[HTTPStatus, bytes]:

@@ -1,4 +1,4 @@
-"""Confirms that the robot has stopped or is disarmed, for `mudskipper stop` and `disarm`, the screen and the page.
+"""`mudskipper stop` and `disarm`, and orders of the screen and the page: a stop counts once every drive confirmed it.
 
 A drive confirms by a heartbeat that is newer than the request: of any state where the robot holds its pose, else of an
 idle drive. In every other case the torque is unknown, and the operator has to cut the motor power.
@@ -9,6 +9,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from command_line import exit_codes
+from command_line.errors import explain
+from command_line.operation.mode_output import print_mode
+from command_line.screen import complain
+from command_line.shared_options import Json, Socket
 from firmware_host.sockets.rpc import FOR_MEMBERS
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
@@ -21,32 +26,17 @@ LONGEST_S = {"stop": 10.0, "disarm": 5.0}
 TORQUE_UNKNOWN = "torque unknown: cut motor power"
 
 
-class Confirmation(NamedTuple):
-    """What is known after a stop or a disarm was accepted."""
+class Ended(NamedTuple):
+    """What became of a stop or a disarm. Only with the status OK has every drive confirmed it."""
 
-    method: str
-    mode: str  # the last one
-    notice: str  # of the daemon, in that mode
-    reached: bool  # a mode that the method may end in
-    unconfirmed: list[str]  # joints
-
-    @property
-    def complete(self) -> bool:
-        return self.reached and not self.unconfirmed
+    status: int  # of the command's exit
+    text: str
+    mode: str = ""  # that was reached
+    notice: str = ""  # of the daemon, in that mode
 
     @property
-    def text(self) -> str:
-        if not self.reached:
-            advice = "; 'mudskipper disarm' switches torque off at once" if self.method == "stop" else ""
-            return f"still {self.mode} after {LONGEST_S[self.method]:g} s{advice}"
-        if self.unconfirmed:
-            return f"{self.method} is not confirmed by {', '.join(self.unconfirmed)}"
-        return f"{self.method}: every drive has confirmed it"
-
-
-class Answer(NamedTuple):
-    confirmed: bool
-    text: str  # for the operator
+    def answer(self) -> str:
+        return self.text if self.status == exit_codes.OK else f"{TORQUE_UNKNOWN}. {self.text}"
 
 
 def unconfirmed_drives(report: dict[str, Any], since_request_s: float) -> list[str]:
@@ -60,7 +50,7 @@ def _confirms(drive: dict[str, Any], holding: bool, since_request_s: float) -> b
     return age_s is not None and age_s < since_request_s and (holding or not drive["closed_loop"])
 
 
-def confirm(client: StatusClient, method: str) -> Confirmation:
+def _confirm(client: StatusClient, method: str) -> Ended:
     """Wait for the drives after the method was accepted. Raises NotPermittedError where the status is not shown."""
     requested_s = time.monotonic()
     reached_s: float | None = None
@@ -68,37 +58,62 @@ def confirm(client: StatusClient, method: str) -> Confirmation:
         asked_s = time.monotonic()
         report = client.call("status")
         unconfirmed = unconfirmed_drives(report, asked_s - requested_s)
-        reached_s = (reached_s or asked_s) if report["mode"] in ENDINGS[method] else None
-        if reached_s is None:
-            ended = asked_s - requested_s > LONGEST_S[method]
-        else:
-            ended = not unconfirmed or asked_s - reached_s > CONFIRMING_S
-        if ended:
-            return Confirmation(method, report["mode"], report["notice"], reached_s is not None, unconfirmed)
+        mode, notice = report["mode"], report["notice"]
+        reached_s = (reached_s or asked_s) if mode in ENDINGS[method] else None
+        if reached_s is None and asked_s - requested_s > LONGEST_S[method]:
+            advice = "; 'mudskipper disarm' switches torque off at once" if method == "stop" else ""
+            return Ended(exit_codes.TIMED_OUT, f"still {mode} after {LONGEST_S[method]:g} s{advice}")
+        if reached_s is not None and not unconfirmed:
+            return Ended(exit_codes.OK, f"{method}: every drive has confirmed it", mode, notice)
+        if reached_s is not None and asked_s - reached_s > CONFIRMING_S:
+            text = f"{method} is not confirmed by {', '.join(unconfirmed)}"
+            return Ended(exit_codes.TORQUE_UNKNOWN, text, mode, notice)
         time.sleep(POLL_S)
 
 
-def who_may_see(accepted: str, problem: NotPermittedError) -> str:
-    """Return the message for a user who may stop the robot, but not see its status."""
-    group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
-    return f"{accepted}; only members of the group {group} can see whether the robot has stopped"
-
-
-def end_motion(path: Path, method: str) -> Answer:
+def end_motion(path: Path, method: str) -> Ended:
     """Request a stop or a disarm over a connection of its own, and wait for the drives."""
     try:
         with closing(StatusClient(path, ANSWER_S)) as client:
             accepted = client.call(method)
             try:
-                confirmation = confirm(client, method)
-            except NotPermittedError as problem:
-                return _unknown(who_may_see(accepted, problem))
+                return _confirm(client, method)
+            except NotPermittedError as problem:  # a user who may stop the robot, but not see its status
+                group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
+                text = f"{accepted}; only members of the group {group} can see whether the robot has stopped"
+                return Ended(exit_codes.TORQUE_UNKNOWN, text)
+    except Exception as problem:  # noqa: BLE001 - `explain` raises again what it does not know
+        messages, status = explain(problem)
+        return Ended(status, "; ".join(messages))
+
+
+def stop(*, socket: Socket, json: Json = False) -> int:
+    return _end("stop", socket, json)
+
+
+def disarm(*, socket: Socket, json: Json = False) -> int:
+    return _end("disarm", socket, json)
+
+
+def _end(command: str, socket: Path, as_json: bool) -> int:
+    ended = end_motion(socket, command)
+    confirmed = ended.status == exit_codes.OK
+    if ended.mode:
+        print_mode(command, as_json, ended.mode, ended.notice, reached=confirmed)
+    if not confirmed:
+        complain(ended.text, TORQUE_UNKNOWN)
+    return ended.status
+
+
+def send_order(path: Path, method: str, **params: Any) -> str:
+    """Send an order over a connection of its own, and return what became of it: none waits for another."""
+    if method in ENDINGS:
+        return end_motion(path, method).answer
+    try:
+        with closing(StatusClient(path, ANSWER_S)) as client:
+            answer = client.call(method, **params)
+            return f"{method}: {answer if isinstance(answer, str) else answer['time']}"
     except (CallRefusedError, NotPermittedError) as problem:
-        return _unknown(f"{method} refused: {problem}")
+        return f"{method} refused: {problem}"
     except NoDaemonError as problem:
-        return _unknown(f"{method}: {problem}")
-    return Answer(True, confirmation.text) if confirmation.complete else _unknown(confirmation.text)
-
-
-def _unknown(text: str) -> Answer:
-    return Answer(False, f"{TORQUE_UNKNOWN}. {text}")
+        return f"{method}: {problem}"

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.operation.attended_walk import LEASE_S, RENEWAL_S, LiveLine
-from command_line.operation.confirmed_stop import stop
+from command_line.operation.confirmation import stop
 from command_line.operation.operation import LEAST_DEPTH_CM, connect
 from command_line.operation.pads import (
     ARM,

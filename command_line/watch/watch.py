@@ -7,11 +7,11 @@ from importlib.util import find_spec
 from typing import Annotated
 
 from command_line import exit_codes
+from command_line.operation.confirmation import send_order
 from command_line.operation.operation import connect
 from command_line.screen import complain
 from command_line.shared_options import Socket
 from command_line.watch.feed import Feed
-from command_line.watch.orders import send_order
 from command_line.watch.plain_lines import print_lines
 from experiments.study.option import Option
 

@@ -63,11 +63,3 @@ def test_a_walk_reads_the_flippers_summary_as_its_truth(
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["settings"]["muds"] == [["51.2", 0.2]]
     assert summary["settings"]["truth"] == "file"
-
-
-def test_an_invalid_truth_file_is_refused_before_anything_begins(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*FLIPPER, "--truth", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == exit_codes.UNHEALTHY
-    assert str(tmp_path / "none") in capsys.readouterr().err
-    assert not list((tmp_path / "out").glob("*.mcap"))

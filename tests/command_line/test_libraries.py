@@ -50,6 +50,7 @@ def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> No
         ("film", log, "--out", "x.gif"): "plots",
         ("log", "export", "--parquet", log): "data",
         ("log", "query", "select 1", "."): "data",
+        ("experiment", "trackway", "--simulated"): "plots",
         ("log", "list", "."): "",
     }
     program = (
@@ -59,7 +60,7 @@ def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> No
     found = ended(program, folder)
     statuses = [exit_codes.UNHEALTHY if extra else exit_codes.OK for extra in needed.values()]
     assert "walk.mcap" in found.stdout and found.stdout.splitlines()[-1] == str(statuses)
-    assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data")] == [3, 2]
+    assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data")] == [4, 2]
     assert "Traceback" not in found.stderr
 
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from command_line.robot_text import is_stale, torque_state
+from command_line.robot_text import is_stale, torque_state, unheard_text
+from command_line.screen import coefficient
+from control.records import JOINTS
+from experiments.reports.text_tables import number
 
 
 @pytest.mark.parametrize(
@@ -24,3 +29,27 @@ def test_the_torque_of_a_silent_drive_is_unknown(age_s: float | None, closed_loo
 @pytest.mark.parametrize(("age_s", "stale"), [(0.002, False), (0.5, True), (None, True)])
 def test_a_position_that_does_not_come_any_more_is_stale(age_s: float | None, stale: bool) -> None:
     assert is_stale({"angle_age_s": age_s}) == stale
+
+
+def test_the_status_names_drives_that_were_not_heard_yet() -> None:
+    heard: dict[str, Any] = {"angle_age_s": 0.0, "current_age_s": 0.0, "heartbeat_age_s": 0.1}
+    drives = [heard | {"joint": joint} for joint in JOINTS]
+    drives[1] = drives[1] | {"heartbeat_age_s": None}
+    drives[3] = drives[3] | {"angle_age_s": None}
+    line = unheard_text({"drives": drives})
+    assert "left_adduction, right_adduction" in line and "left_sweep" not in line
+
+
+@pytest.mark.parametrize(("value", "text"), [(-0.0001, "0.000"), (-0.0, "0.000"), (-0.001, "-0.001"), (None, "-")])
+def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("valid", "at_least", "text"),
+    [(True, False, "1.235 ± 0.046"), (True, True, "≥ 1.235 ± 0.046"), (False, True, "(≥ 1.235 ± 0.046)")],
+)
+def test_an_estimate_is_printed_with_its_standard_error_and_its_limits(valid: bool, at_least: bool, text: str) -> None:
+    reported = {"value": 1.23456e6, "std_error": 4.56e4, "valid": valid, "at_least": at_least}
+    assert coefficient(reported) == text
+    assert coefficient(reported | {"value": None}) == "-"

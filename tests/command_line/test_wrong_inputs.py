@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.operation.confirmation import TORQUE_UNKNOWN
 from simulation.harness.local_setup import configuration_text
 from tests.command_line.command_lines import run
 
@@ -91,6 +92,53 @@ WRONG_COMMAND_LINES = [  # and what the message names
     (EXPERIMENT.format("flipper --simulated --mud 70"), "70 %"),
     (EXPERIMENT.format("walk --simulated --soft clay"), "clay"),
     (EXPERIMENT.format("walk --mud 47.6 --mud 47.6=30"), "--mud"),
+    (EXPERIMENT.format("trackway --method paper"), "--method can only be given with --simulated"),
+    (EXPERIMENT.format("trackway --mud soft --mud soft"), "--mud"),
+    (EXPERIMENT.format("trackway --workers 2"), "can only be given with --simulated"),
+    (EXPERIMENT.format("trackway --compartment 0.5"), "--compartment can only be given with --simulated"),
+    (EXPERIMENT.format("trackway --simulated --mud 48.5"), "--mud can only be given without --simulated"),
+    (EXPERIMENT.format("trackway --mud 48.5=5"), "from 20 to 10000 cm"),
+    (EXPERIMENT.format("trackway --simulated --method paper --method fog"), "'fog'"),
+    (EXPERIMENT.format("trackway --simulated --seeds 0"), "--seeds"),
+    *((EXPERIMENT.format(f"trackway --simulated --compartment {wrong}"), "--compartment") for wrong in ("0.1", "nan")),
+    (EXPERIMENT.format("trackway --simulated --out text.mcap"), "must be a folder"),
+    (EXPERIMENT.format("sweep"), "--simulated"),
+    (EXPERIMENT.format("sweep --simulated --workers 0"), "--workers"),
+    (EXPERIMENT.format("sweep --simulated --workers 2 --cluster tcp://127.0.0.1:8786"), "--workers"),
+    *((EXPERIMENT.format(f"sweep --simulated --strength {wrong}"), "--strength") for wrong in ("49", "firm")),
+    (EXPERIMENT.format("mud-fit --simulated --seeds 1001"), "--seeds"),
+    *(
+        (EXPERIMENT.format(f"actuator --simulated {wrong}"), wrong.split()[0])
+        for wrong in ("--weights heavy", "--weights 100", "--lever 0", "--trials 0", "--joint knee")
+    ),
+    *((f"calibrate {wrong} --out none", wrong.split()[0]) for wrong in ("--joint middle_sweep", "--weights 100")),
+    (EXPERIMENT.format("loadcell"), "--port"),
+    *(
+        (EXPERIMENT.format(f"loadcell --simulated {wrong}"), named)
+        for wrong, named in (
+            ("--mud clay", "water content"),
+            ("--mud 70", "44 to 56"),
+            ("--mud 50 --mud 50", "same name"),
+            ("--depth 4", "plate's height"),
+            ("--format words", "column1 to column9"),
+            ("--unit stone", "must be one of"),
+        )
+    ),
+    *(
+        (EXPERIMENT.format(f"loadcell --port /dev/nothing {wrong}"), named)
+        for wrong, named in (
+            ("--position", "--position PATH"),
+            ("--position /dev/other", "--position-step"),
+            ("--position /dev/nothing", "two ports"),
+            ("--position /dev/../dev/nothing", "two ports"),
+        )
+    ),
+    *(
+        (EXPERIMENT.format(f"loadcell {wrong}"), wrong.split()[0])
+        for wrong in ("--plate 3x900", "--speed 0", "--baud 5", "--scale -1")
+    ),
+    ("init - --plate x --set plate_width_m=0.02", "--set plate_width_m: must be"),
+    *((f"fail left_sweep off {wrong}", "fail") for wrong in ("--list", "--for nan", "--for inf")),
 ]
 MISSING_INPUTS = [
     "log info /none/x.mcap",
@@ -122,6 +170,7 @@ MISSING_INPUTS = [
     "experiment lablogs /none/x.csv",
     "experiment flipper --simulated --mud 47.6 --out out --truth /none/x.json",
     "experiment campaign /none/x.toml",
+    "calibrate --out out --config /none/x.toml",
     "doctor --config /none/x.toml",
     "check --config /none/x.toml",
     "upgrade --check /none/x.deb",
@@ -151,7 +200,23 @@ WRONG_CONFIGURATIONS = [
         ("type.toml", "drive.left_sweep.type = 'odriv': there is no such type; did you mean odrive?"),
     )
 ]
-NEEDS_DAEMON = ("status", "arm", "walk --depth 2.0cm", "move left_sweep=10", "stop", "disarm", "clear", "fail --list")
+WRONG_CONFIGURATIONS += [
+    (f"{command} broken.toml", "broken.toml: not a TOML file: ")
+    for command in (
+        *(f"{command} --config" for command in READ_CONFIGURATION),
+        *("log list --config", "log recover --config", "simulate --world", "demo --world"),
+        "experiment actuator --simulated --out out --config",
+    )
+]
+WRONG_CONFIGURATIONS += [
+    ("init - --set drop_m=0.07", "geometry.axis_height_m"),
+    ("init - --set drop_m=0.6", "geometry.drop_m = 0.6: must be at most 0.5"),
+    ("init - --node left_sweep=1 --node right_sweep=1", "has the same on bus"),
+]
+NEEDS_DAEMON = (
+    *("status", "arm", "walk --depth 2.0cm", "move left_sweep=10", "stop", "disarm", "clear", "fail --list", "watch"),
+    *(EXPERIMENT.format(name) for name in ("trackway", "flipper --mud 47.6", "walk --mud 47.6")),
+)
 CASES = [
     *((exit_codes.USAGE, *case) for case in WRONG_COMMAND_LINES),
     *(
@@ -159,6 +224,10 @@ CASES = [
         for line in MISSING_INPUTS
     ),
     *((exit_codes.UNHEALTHY, *case) for case in UNREADABLE),
+    *(
+        (exit_codes.UNHEALTHY, f"{command} --config broken.toml", "line 2, column 11")
+        for command in ("check", "doctor")
+    ),
     *((exit_codes.CONFIGURATION, *case) for case in WRONG_CONFIGURATIONS),
     *((exit_codes.NO_DAEMON, line, "no daemon answers on /none.sock") for line in NEEDS_DAEMON),
     (exit_codes.REFUSED, "log preserve text.mcap", "only a log in done/"),
@@ -173,6 +242,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wrong = {
         "keys.toml": text.replace("node_id = 0", "nod_id = 0") + '[robbot]\nname = "x"\n',
         "interface.toml": text.replace('"mudskipper_local"', '"sockercan"'),
+        "broken.toml": "[limits]\ntorque_nm 0.8\n",
         "type.toml": text.replace("node_id = 0", 'node_id = 0\ntype = "odriv"'),
     }
     for name, content in {"robot.toml": text, "text.mcap": "no log\n", **wrong}.items():
@@ -192,5 +262,6 @@ def test_a_wrong_input_is_refused_with_its_status_and_its_name(
     said = ended.stdout + ended.stderr
     assert ended.returncode == status, said
     assert named in " ".join(said.split()) and "Traceback" not in said
+    assert (TORQUE_UNKNOWN in said) == (line in ("stop", "disarm"))
     if status == exit_codes.USAGE:
         assert (ended.stdout == "" or "--json" in line) and set(inputs.iterdir()) == before

@@ -81,16 +81,6 @@ def test_weights_that_the_robot_cannot_hold_are_refused_before_anything_moves(
     assert "limits.torque_nm = 1.4: must be at least" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "options", [["--weights", "heavy"], ["--weights", "100"], ["--lever", "0"], ["--trials", "0"], ["--joint", "knee"]]
-)
-def test_options_without_a_valid_plan_are_wrong_usage(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["experiment", "actuator", "--simulated", *options])
-    assert ended.value.code == exit_codes.USAGE
-    assert options[0] in capsys.readouterr().err
-
-
 def test_an_operator_at_a_terminal_is_prompted_and_may_skip_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -36,13 +36,3 @@ def test_a_person_must_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     command = ["calibrate", "--practise", "--joint", "left_sweep", "--out", str(tmp_path / "out")]
     assert main(command) == exit_codes.REFUSED
     assert (tmp_path / "out" / "notebook.jsonl").exists()
-
-
-@pytest.mark.parametrize("wrong", [["--joint", "middle_sweep"], ["--weights", "100"], ["--config", "nowhere.toml"]])
-def test_wrong_input_is_refused_before_anything_moves(tmp_path: Path, wrong: list[str]) -> None:
-    command = ["calibrate", *wrong, "--out", str(tmp_path / "out")]
-    try:
-        status = main(command)
-    except SystemExit as ended:
-        status = int(ended.code or 0)
-    assert status in (exit_codes.USAGE, exit_codes.UNHEALTHY) and not list(tmp_path.rglob("notebook.jsonl"))

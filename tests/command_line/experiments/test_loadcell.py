@@ -96,39 +96,6 @@ def test_another_mud_is_added_to_the_report(
     assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ([], "--port"),
-        (["--simulated", "--mud", "clay"], "water content"),
-        (["--simulated", "--mud", "70"], "44 to 56"),
-        (["--simulated", "--mud", "50", "--mud", "50"], "same name"),
-        (["--simulated", "--depth", "4"], "plate's height"),
-        (["--simulated", "--format", "words"], "column1 to column9"),
-        (["--simulated", "--unit", "stone"], "must be one of"),
-        (["--port", "/dev/nothing", "--position"], "--position PATH"),
-        (["--port", "/dev/nothing", "--position", "/dev/other"], "--position-step"),
-        (["--port", "/dev/nothing", "--position", "/dev/nothing"], "two ports"),
-        (["--port", "/dev/nothing", "--position", "/dev/../dev/nothing"], "two ports"),
-    ],
-)
-def test_impossible_options_are_refused_at_once(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
-    status, _, reported = run(capsys, "experiment", "loadcell", *arguments)
-    assert status == exit_codes.USAGE
-    assert message in reported
-
-
-@pytest.mark.parametrize(
-    "arguments", [["--plate", "3"], ["--plate", "3x900"], ["--speed", "0"], ["--baud", "5"], ["--scale", "-1"]]
-)
-def test_an_argument_out_of_bounds_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["experiment", "loadcell", *arguments])
-    assert arguments[0] in capsys.readouterr().err
-
-
 def test_a_missing_port_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(tmp_path / "ttyNONE")
     status, _, reported = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))

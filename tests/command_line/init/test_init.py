@@ -141,32 +141,6 @@ def test_depths_and_force_follow_the_geometry(length_m: float) -> None:
     assert parse_configuration(new_file(robot)).geometry.flipper_length_m == length_m
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "words"),
-    [
-        (("--set", "drop_m=0.07"), exit_codes.CONFIGURATION, "geometry.axis_height_m"),
-        (("--set", "drop_m=0.6"), exit_codes.CONFIGURATION, "geometry.drop_m = 0.6: must be at most 0.5"),
-        (("--plate", "x", "--set", "plate_width_m=0.02"), exit_codes.USAGE, "--set plate_width_m: must be"),
-        (("--channel", "a", "--channel", "b", "--channel", "c"), exit_codes.USAGE, "must be 1 or 2"),
-        (("--flippers", "right", "--node", "left_sweep=1"), exit_codes.USAGE, "right_sweep, right_adduction"),
-        (("--node", "left_sweep=1", "--node", "right_sweep=1"), exit_codes.CONFIGURATION, "has the same on bus"),
-    ],
-)
-def test_a_file_that_the_daemon_would_refuse_is_not_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], status: int, words: str
-) -> None:
-    path = tmp_path / "robot.toml"
-    assert main(["init", str(path), *arguments]) == status
-    assert words in capsys.readouterr().err and not path.exists()
-
-
-def test_a_file_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "robot.toml"
-    path.write_text("mine")
-    assert main(["init", str(path)]) == exit_codes.USAGE
-    assert path.read_text() == "mine" and "exists" in capsys.readouterr().err
-
-
 def test_the_file_has_a_default_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["init"]) == exit_codes.OK

@@ -15,7 +15,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.operation import attended_walk
-from operator_client.status_client import StatusClient
+from tests.command_line.fake_client import FakeClient, next_of
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
@@ -30,16 +30,6 @@ def attended(bench: Bench, *arguments: str) -> Iterator[subprocess.Popen[str]]:
             yield walk
         finally:
             walk.kill()
-
-
-class EndingWalk(StatusClient):
-    """Answers each `status` with the next of `reports`."""
-
-    def __init__(self, *reports: dict[str, Any]) -> None:
-        self.reports = list(reports)
-
-    def call(self, method: str, **params: Any) -> Any:
-        return self.reports.pop(0) if method == "status" else "accepted"
 
 
 def report(mode: str, message: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
@@ -71,7 +61,7 @@ def test_a_walk_that_a_fault_ended_is_refused_with_its_cause(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    assert attended_walk.attend(EndingWalk(*reports), False, {}) == status
+    assert attended_walk.attend(FakeClient(next_of(*reports)), False, {}) == status
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == reports[-1]["mode"]
     assert printed.err == (f"mudskipper: {complaint}\n" if complaint else "")
@@ -81,11 +71,11 @@ def test_programs_read_one_object_at_the_end_of_an_attended_walk(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    assert attended_walk.attend(EndingWalk(report("walking"), report("hold")), True, {}) == exit_codes.OK
+    assert attended_walk.attend(FakeClient(next_of(report("walking"), report("hold"))), True, {}) == exit_codes.OK
     assert json.loads(capsys.readouterr().out) == {
         "schema": "operation/1", "command": "walk", "mode": "hold", "notice": "",
     }  # fmt: skip
-    assert attended_walk.attend(EndingWalk(report("fault", "It is silent.")), True, {}) == exit_codes.REFUSED
+    assert attended_walk.attend(FakeClient(next_of(report("fault", "It is silent."))), True, {}) == exit_codes.REFUSED
     assert capsys.readouterr().out == ""
 
 

@@ -32,38 +32,24 @@ from command_line.operation.pads import (
 from drivers.input_keys import InputKeys
 from operator_client.status_client import CallRefusedError, StatusClient
 from tests.command_line.command_lines import run
+from tests.command_line.fake_client import FakeClient
 from tests.running_bench import Bench
 
 RELEASED, HELD = Controls(False), Controls(True, frozenset({DEAD_MAN}))
 Report = dict[str, Any]
 
 
-class Connection(StatusClient):
-    """Records the calls, and refuses those that are named."""
-
-    def __init__(self, refused: tuple[str, ...] = ()) -> None:
-        self.calls: list[str] = []
-        self.refused = refused
-
-    def call(self, method: str, **params: Any) -> Any:
-        self.calls.append(f"{method} {params.get('depth_m', '')}".strip())
-        if method in self.refused:
-            raise CallRefusedError(f"{method}: no")
-
-    def close(self) -> None:
-        self.calls.append("close")
-
-
 class Driven:
     """A hand drive with its connections, at 0.1 s a step."""
 
     def __init__(self, *refused: str) -> None:
-        self.connections: list[Connection] = []
+        self.connections: list[FakeClient] = []
         self.refused, self.now_s = refused, 0.0
         self.drive = HandDrive(self._connect)
 
-    def _connect(self) -> Connection:
-        self.connections.append(Connection(self.refused))
+    def _connect(self) -> FakeClient:
+        refused = {name: CallRefusedError(f"{name}: no") for name in self.refused}
+        self.connections.append(FakeClient(refused.get))
         return self.connections[-1]
 
     def step(self, controls: Controls, mode: str = "hold", steps: int = 1) -> None:

@@ -115,18 +115,6 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     }
 
 
-def test_without_a_daemon_every_command_says_so(
-    short_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(short_folder)
-    experiments = ("experiment flipper --mud 47.6", "experiment walk --mud 47.6")
-    for command in ("status", "arm", "walk", "stop", "disarm", "clear", "watch", *experiments):
-        assert main([*command.split(), "--socket", str(short_folder / "none")]) == exit_codes.NO_DAEMON, command
-        said = capsys.readouterr().err
-        assert "systemctl start mudskipper" in said
-        assert (TORQUE_UNKNOWN in said) == (command in ("stop", "disarm"))
-
-
 def test_check_without_a_daemon_checks_what_it_can(
     short_folder: Path, tmp_path: Path, example_text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

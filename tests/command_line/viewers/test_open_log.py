@@ -48,17 +48,6 @@ def test_a_missing_viewer_is_named(
     assert not started
 
 
-@pytest.mark.parametrize("contents", [None, b"", b"no log"])
-def test_a_file_that_viewers_cannot_open_is_one_message(
-    contents: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str], started: list[list[str]]
-) -> None:
-    path = tmp_path / "cut.mcap"
-    if contents is not None:
-        path.write_bytes(contents)
-    assert str(path) in failure(capsys, "log", "open", str(path), "--with", "plotjuggler")
-    assert not started
-
-
 def test_a_log_that_is_being_written_needs_no_repair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "now.mcap"
     path.write_bytes(Path(LOG).read_bytes()[:-1000])

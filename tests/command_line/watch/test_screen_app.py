@@ -13,9 +13,9 @@ from textual.pilot import Pilot
 
 from command_line import exit_codes
 from command_line.operation import confirmation
+from command_line.operation.confirmation import send_order
 from command_line.watch.feed import Feed
 from command_line.watch.mud_cells import COEFFICIENTS
-from command_line.watch.orders import send_order
 from command_line.watch.screen_app import Rows, WatchApp
 from control.modes import ENERGISED, Mode
 from control.records import JOINTS

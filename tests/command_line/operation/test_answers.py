@@ -1,0 +1,150 @@
+"""What commands make of a daemon's answers: a stop succeeds only if every drive has confirmed it."""
+
+from __future__ import annotations
+
+from json import loads
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.operation import confirmation
+from command_line.operation.confirmation import TORQUE_UNKNOWN, send_order, unconfirmed_drives
+from control.records import JOINTS
+from operator_client.status_client import CallRefusedError, DroppedError, NotPermittedError
+from tests.command_line.command_lines import run
+from tests.command_line.fake_client import answer_with, next_of
+
+REFUSAL = "status is for members of the group mudskipper. Have root run 'adduser YOU mudskipper', then log in again"
+Report = dict[str, Any]
+
+
+def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:
+    """Return a status with equal drives; `changed` alters the left adduction drive."""
+    drives = [{"joint": joint, "closed_loop": closed_loop, "heartbeat_age_s": age_s} for joint in JOINTS]
+    drives[1] |= changed or {}
+    return {"mode": mode, "notice": "", "drives": drives}
+
+
+@pytest.mark.parametrize(
+    ("found", "unconfirmed"),
+    [
+        (report("idle", closed_loop=False), 0),
+        (report("hold", closed_loop=True), 0),
+        (report("fault", closed_loop=False), 0),
+        (report("fault", closed_loop=True), 4),
+        (report("idle", closed_loop=False, age_s=0.4), 4),  # the heartbeats are older than the request
+        (report("hold", closed_loop=True, changed={"heartbeat_age_s": 0.4}), 1),
+        (report("boot", closed_loop=False, age_s=None), 4),
+        (report("idle", closed_loop=False, changed={"heartbeat_age_s": None}), 1),
+    ],
+)
+def test_a_drive_confirms_by_a_heartbeat_after_the_request(found: Report, unconfirmed: int) -> None:
+    assert len(unconfirmed_drives(found, since_request_s=0.3)) == unconfirmed
+
+
+class Clock:
+    """A clock on which only waiting takes time."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(confirmation, "time", Clock())
+
+
+@pytest.mark.parametrize("command", ["stop", "disarm"])
+@pytest.mark.parametrize("mode", ["idle", "fault"])
+def test_confirmed_idle_drives_are_a_success(command: str, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    unconfirmed = report("walking", True, -1.0), report(mode, True, -1.0)
+    answer_with(monkeypatch, next_of(*unconfirmed, report(mode, False, -1.0)))
+    ended = run(command)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (exit_codes.OK, f"{mode}\n", "")
+
+
+def test_programs_read_the_mode_of_a_confirmed_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, next_of(report("hold", True, -1.0)))
+    confirmed = {"schema": "operation/1", "command": "stop", "mode": "hold", "notice": ""}
+    assert loads(run("stop", "--json").stdout) == confirmed
+    answer_with(monkeypatch, next_of(report("hold", True, -1.0, {"heartbeat_age_s": 3.0})))
+    assert loads(run("stop", "--json").stdout)["status"] == exit_codes.TORQUE_UNKNOWN
+
+
+def test_a_held_pose_is_the_success_of_a_stop_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, next_of(report("hold", True, -1.0)))
+    assert run("stop").returncode == exit_codes.OK
+    ended = run("disarm")
+    assert ended.returncode == exit_codes.TIMED_OUT and TORQUE_UNKNOWN in ended.stderr
+
+
+@pytest.mark.parametrize("command", ["stop", "disarm"])
+@pytest.mark.parametrize("changed", [{"closed_loop": True}, {"heartbeat_age_s": None}, {"heartbeat_age_s": 3.0}])
+def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
+    command: str, changed: Report, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer_with(monkeypatch, next_of(report("fault", False, -1.0, changed)))
+    ended = run(command)
+    assert (ended.returncode, ended.stdout) == (exit_codes.TORQUE_UNKNOWN, "fault\n")
+    assert "left_adduction" in ended.stderr and "right" not in ended.stderr and TORQUE_UNKNOWN in ended.stderr
+    answer = send_order(Path("/none"), command)  # of the screen and the page
+    assert answer.startswith(TORQUE_UNKNOWN) and "left_adduction" in answer
+
+
+# a user who may stop the robot, and nothing else
+
+
+def for_stops_alone(method: str) -> Any:
+    return "accepted" if method in ("stop", "disarm") else NotPermittedError(REFUSAL)
+
+
+@pytest.mark.parametrize("command", ["stop", "disarm"])
+def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
+    command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer_with(monkeypatch, for_stops_alone)
+    ended = run(command)
+    assert ended.returncode == exit_codes.TORQUE_UNKNOWN
+    assert all(text in ended.stderr for text in ("accepted", "group mudskipper ", TORQUE_UNKNOWN))
+
+
+@pytest.mark.parametrize("command", ["status", "arm", "walk", "walk --attended", "clear", "check"])
+def test_anything_else_is_not_permitted(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, for_stops_alone)
+    ended = run(*command.split())
+    assert (ended.returncode, ended.stderr) == (exit_codes.NOT_PERMITTED, f"mudskipper: {REFUSAL}\n")
+
+
+@pytest.mark.parametrize("command", ["status", "check", "clear"])
+def test_a_closed_connection_is_not_reported_as_a_missing_daemon(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, lambda method: DroppedError("the daemon closed the connection"))
+    ended = run(command)
+    assert (ended.returncode, ended.stdout) == (exit_codes.NO_DAEMON, "")
+    assert ended.stderr == "mudskipper: the daemon closed the connection\n"
+
+
+# arm --wait
+
+
+@pytest.mark.parametrize(
+    ("mode", "option", "status"),
+    [("idle", "--wait", exit_codes.OK), ("fault", "--wait", exit_codes.REFUSED), ("idle", "", exit_codes.REFUSED)],
+)
+def test_only_what_ends_by_itself_is_waited_for(
+    mode: str, option: str, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = [CallRefusedError("The left_sweep joint moves while torque is off.")] * 3 + ["armed"]
+    answer_with(
+        monkeypatch,
+        lambda method: answers.pop(0) if method == "arm" else {"mode": mode if answers else "hold", "notice": ""},
+    )
+    ended = run("arm", *filter(None, [option]))
+    assert ended.returncode == status and ended.stderr.count("left_sweep joint moves") == 1
