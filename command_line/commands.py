@@ -1,13 +1,19 @@
 """The commands of `mudskipper`: the function and the help of each.
 
-A function is named as `module.function` below this package, and imported when its command is used. So are a study
-and the commands of a group.
+A function is named as `module.function` below this package, and imported when its command is used. So is a study.
 """
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
-Command: TypeAlias = tuple[Any, str]  # a name, the commands of a group or a study, with the help
+Command: TypeAlias = tuple[Any, str]  # a name, the commands of a group, or a study, with the help
+
+
+class Found(NamedTuple):
+    """A group whose commands are found when it is used."""
+
+    function: str  # that returns them
+
 
 DRIVES: Mapping[str, Command] = {
     "find": ("drives.find.find", "List the drives that answer on the buses."),
@@ -62,5 +68,5 @@ COMMANDS: Mapping[str, Command] = {
     "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
     "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
     "log": (LOGS, "Read and manage logs."),
-    "experiment": ("experiments.studies.STUDIES", "The paper's experiments."),
+    "experiment": (Found("experiments.studies.find_commands"), "The paper's experiments."),
 }

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from command_line.json_output import JSON, Answer
 from experiments.study.option import REQUIRED, DeclaredOption, Option, declared_options
 
 METAVARS = {int: "N", float: "X", Path: "FILE", str: "NAME"}
@@ -32,6 +33,8 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
         else:
             action = groups[alternative].add_argument(each.parameter, **_keywords(each))
         action.offers = each.option.offers  # for the completion of shells
+    if any(function.__annotations__.get("return") is Answer for function in functions):
+        parser.add_argument(JSON, action="store_true", help="print JSON for programs")
 
 
 def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:

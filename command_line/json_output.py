@@ -6,7 +6,7 @@ docs/reference/json.md describes each shape.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from command_line import exit_codes
 
@@ -31,6 +31,25 @@ SCHEMAS = {  # what prints it -> version
     "log-recover": 1,
     "log-report": 1,
 }
+
+
+class Answer(NamedTuple):
+    """What a command has found, for programs and for people. A command that returns one has the option --json."""
+
+    report: Any
+    text: str
+    status: int = exit_codes.OK
+    schema: str = ""  # a key of SCHEMAS, unless the report is a list or has its schema already
+
+    def print(self, as_json: bool) -> int:
+        """Print it, and return the exit status."""
+        if not as_json:
+            print(self.text)
+        elif self.schema:
+            print_json(self.schema, self.report)
+        else:
+            print_value(self.report)
+        return self.status
 
 
 def with_schema(name: str, report: dict[str, Any]) -> dict[str, Any]:

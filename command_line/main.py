@@ -8,7 +8,7 @@ from io import TextIOWrapper
 from command_line import exit_codes
 from command_line.errors import report
 from command_line.function_options import given_options
-from command_line.json_output import JSON, answers, print_error
+from command_line.json_output import JSON, Answer, answers, print_error
 from command_line.parser import build_parser
 from command_line.screen import complaints
 
@@ -41,7 +41,8 @@ def _run(given: Sequence[str]) -> int:
         target = options.target
         if hasattr(target, "run"):  # a study, which several functions run
             return int(target.run(options))
-        return int(target(**given_options(options, target)))
+        ended: Answer | int = target(**given_options(options, target))
+        return ended.print(options.json) if isinstance(ended, Answer) else ended
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed it

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from command_line import exit_codes
-from command_line.commands import COMMANDS, Command
+from command_line.commands import COMMANDS, Command, Found
 from command_line.function_options import add_function_options
 from command_line.screen import complaints
 from control.computing.suggestion import suggestion
@@ -45,9 +45,10 @@ class Parser(argparse.ArgumentParser):
     def add_target(self) -> None:
         """Add the options of the function or the study, or the commands of the group, once."""
         target, self._target = self._target, None
-        if isinstance(target, str):
-            module, name = target.rsplit(".", 1)
-            target = getattr(import_module(f"command_line.{module}"), name)
+        if isinstance(target, Found):
+            target = _named(target.function)()
+        elif isinstance(target, str):
+            target = _named(target)
         if isinstance(target, Mapping):
             self.add_commands(target)
         elif target is not None:
@@ -90,6 +91,11 @@ class Parser(argparse.ArgumentParser):
             message = f"{message} ('{self.prog} --help' explains them)"
         complaints.append(message)
         super().error(message)
+
+
+def _named(name: str) -> Any:
+    module, attribute = name.rsplit(".", 1)
+    return getattr(import_module(f"command_line.{module}"), attribute)
 
 
 class PrintVersion(argparse.Action):

@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from command_line import exit_codes
-from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
+from command_line.demo.demonstration import ENDING_SIGNALS, Demo, running_demo
 from command_line.errors import CommandError, missing_library
 from command_line.json_output import print_json
+from command_line.robot_text import Report, machine_lines
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from command_line.shared_options import Json, Seed
 from control.modes import Mode
@@ -25,12 +26,11 @@ from experiments.reports.mud_names import mud_text
 from experiments.study.option import Option
 from experiments.study.values import folder
 from firmware_host.log.log_folder import DONE, log_files, present_path
-from logs.files.log_reader import Log, read_log
+from logs.files.log_reader import read_log
 from operator_client.status_client import CallRefusedError, NoDaemonError
 from simulation.harness.world import load_world
 from simulation.mud.track import Track
 
-WALKED = ("mode", "stamp_s", "body_x_m")  # fields of a tick that the summary needs
 LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stride begins
 
 
@@ -44,7 +44,9 @@ def demo(
     ] = None,
     world: Annotated[Path | None, Option("describes the ground (default: three muds)")] = None,
 ) -> int:
-    _end_on_signals()
+    for number in ENDING_SIGNALS:  # each ends the demo as Ctrl-C does
+        if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
+            signal.signal(number, signal.default_int_handler)
     if world:
         load_world(world)  # is refused before anything starts
     if find_spec("matplotlib") is None:
@@ -55,25 +57,18 @@ def demo(
         with redirect_stdout(sys.stderr if json else sys.stdout):  # data goes to standard output, all else not
             report, demonstration = _perform(out, seed, depth, world)
             summary = _conclude(out, report, demonstration)
-    except (InterruptedDemoError, KeyboardInterrupt) as problem:
+    except KeyboardInterrupt as problem:
         for path in sorted(set(log_files(out, DONE)) - before):
             print(f"\nlog      {path}")
         raise CommandError(str(problem) or "stopped", status=exit_codes.INTERRUPTED) from None
-    except (DemoError, NoDaemonError, CallRefusedError) as problem:
+    except (NoDaemonError, CallRefusedError) as problem:
         raise CommandError(str(problem)) from None
     if json:
         print_json("demo", summary)
     return exit_codes.OK
 
 
-def _end_on_signals() -> None:
-    """Let all ending signals end the demo as Ctrl-C does."""
-    for number in ENDING_SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
-            signal.signal(number, signal.default_int_handler)
-
-
-def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -> tuple[dict[str, Any], Demo]:
+def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -> tuple[Report, Demo]:
     print("Starting a simulated robot and the daemon ...", flush=True)
     with running_demo(out, seed, world) as demonstration:
         os.nice(5)  # the display gives way to robot and daemon
@@ -85,7 +80,7 @@ def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -
         print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds}{water}.\n")
         print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
 
-        def show(stride: dict[str, Any]) -> None:
+        def show(stride: Report) -> None:
             print(stride_line(stride, demonstration.walk_start_s), flush=True)
 
         demonstration.walk(depth_cm, show)
@@ -94,13 +89,12 @@ def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -
         return report, demonstration
 
 
-def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
+def _conclude(out: Path, report: Report, demonstration: Demo) -> Report:
     """Print the summary, draw the plot, and return the summary."""
     log_path = present_path(Path(report["log"]["path"]))
-    log = read_log(log_path, fields=WALKED)
     plot_path = out / log_path.with_suffix(".png").name if find_spec("matplotlib") else None
-    summary = summarise(report, demonstration, log, log_path, plot_path)
-    print(f"\n{summary_text(summary)}", flush=True)
+    summary = summarise(report, demonstration, log_path, plot_path)
+    print(f"\n{summary_text(summary, report)}", flush=True)
     if plot_path is None:
         return summary
     print("Drawing ...", flush=True)
@@ -113,14 +107,13 @@ def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[st
     return summary
 
 
-def summarise(
-    report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path | None
-) -> dict[str, Any]:
-    track = demonstration.track
-    stamps_s, positions_m = walked_path(log)
+def summarise(report: Report, demonstration: Demo, log_path: Path, plot_path: Path | None) -> Report:
+    rows = read_log(log_path, fields=("mode", "stamp_s", "body_x_m")).ticks
+    walked = rows[(rows["mode"] == Mode.WALKING) & np.isfinite(rows["body_x_m"])]
+    stamps_s, positions_m, track = walked["stamp_s"], walked["body_x_m"], demonstration.track
     strides = []
     for stride in demonstration.strides:
-        start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(stamps_s) else 0.0
+        start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(walked) else 0.0
         strides.append(stride | {"mud": track.clay_at(start_m + LEAD_M).name})
     return {
         **report["loop"],
@@ -133,48 +126,38 @@ def summarise(
     }
 
 
-def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    """Return time in s and position in m of the ticks in which the robot walked with a known pose."""
-    rows = log.ticks[(log.ticks["mode"] == Mode.WALKING) & np.isfinite(log.ticks["body_x_m"])]
-    return rows["stamp_s"], rows["body_x_m"]
-
-
 def speeds_cm_s(
     stamps_s: np.ndarray[Any, Any], positions_m: np.ndarray[Any, Any], track: Track
 ) -> dict[str, float | None]:
     """Return the mean speed from the first arrival in each mud to the first arrival in the next."""
     speeds: dict[str, float | None] = {}
     start_m = float(positions_m[0]) if len(positions_m) else 0.0
+    reached_m = np.maximum.accumulate(positions_m)
     for segment in track.segments:
-        inside = np.flatnonzero(positions_m >= start_m)
-        beyond = np.flatnonzero(positions_m >= segment.end_m)
-        first = int(inside[0]) if len(inside) else -1
-        last = int(beyond[0]) if len(beyond) else len(positions_m) - 1
+        first, last = (int(row) for row in np.searchsorted(reached_m, (start_m, segment.end_m)))
+        last = min(last, len(reached_m) - 1)
         name = segment.clay.name
         if name in speeds:  # the same mud again
             name = f"{name} at {start_m:.2f} m"
         speeds[name] = None
-        if 0 <= first < last:
+        if first < last:
             distance_m, duration_s = positions_m[last] - positions_m[first], stamps_s[last] - stamps_s[first]
             speeds[name] = round(100.0 * float(distance_m / duration_s), 2)
         start_m = segment.end_m
     return speeds
 
 
-def summary_text(summary: dict[str, Any]) -> str:
-    late, tick = summary["wake_late_us"], summary["tick_us"]
+def summary_text(summary: Report, report: Report) -> str:
     speeds = ", ".join(
         f"{mud_text(mud)}: {'-' if speed is None else f'{speed:.1f} cm/s'}"
         for mud, speed in summary["speed_cm_s"].items()
     )
     lines = [
-        f"strides  {len(summary['strides'])} of both flippers",
-        f"speed    {speeds}",
-        f"loop     {summary['rate_hz']:.2f} Hz over {summary['ticks']} ticks, {summary['missed_ticks']} missed",
-        f"wake-up  {late['p50']:.0f} us late at the median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
-        f"tick     {tick['p50']:.0f} us at the median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
-        *([f"lost     {counted(summary['dropped_rows'], 'row')} of the log"] if summary["dropped_rows"] else []),
-        *(f"warning  {warning}" for warning in summary["warnings"]),
-        f"log      {summary['log']}",
+        ("strides", f"{len(summary['strides'])} of both flippers"),
+        ("speed", speeds),
+        *((name, text) for name, (text, _) in machine_lines(report) if name in ("loop", "late", "tick")),
+        *([("lost", f"{counted(summary['dropped_rows'], 'row')} of the log")] if summary["dropped_rows"] else []),
+        *(("warning", warning) for warning in summary["warnings"]),
+        ("log", summary["log"]),
     ]
-    return "\n".join(lines)
+    return "\n".join(f"{name:8} {text}" for name, text in lines)

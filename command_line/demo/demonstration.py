@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from command_line.errors import CommandError
 from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import end_with_parent
@@ -36,14 +37,6 @@ def _prepare_child(blocked_before: set[int | signal.Signals]) -> None:
     end_with_parent()
 
 
-class DemoError(Exception):
-    """The demo cannot go on; the text says why."""
-
-
-class InterruptedDemoError(Exception):
-    """A signal ended the demo; the text says in which state."""
-
-
 class Demo:
     """Owns the two processes, the client, and the strides received so far."""
 
@@ -51,7 +44,7 @@ class Demo:
         self.folder = folder
         self.track: Track = load_world(world).track if world else paper_track()
         self.configuration_path = write_local_setup(folder, logs)
-        self.output = (folder / "output.txt").open("w+", encoding="utf-8")
+        self.output = (folder / "output.txt").open("w+", encoding="utf-8", errors="replace")
         ground = () if world is None else ("--world", str(world))
         self.robot = self._start("command_line.main", "simulate", "--seed", str(seed), *ground)
         self.daemon = self._start("firmware_host.daemon")
@@ -87,7 +80,7 @@ class Demo:
                 return
             except NoDaemonError:
                 time.sleep(POLL_S)
-        raise DemoError("the daemon does not answer")
+        raise CommandError("the daemon does not answer")
 
     def _call(self, method: str, **params: Any) -> Any:
         assert self._client is not None, "connect first"
@@ -96,25 +89,22 @@ class Demo:
     def _check_processes(self) -> None:
         for name, process in (("simulated robot", self.robot), ("daemon", self.daemon)):
             if process.poll() is not None:
-                raise DemoError(f"the {name} ended with status {process.returncode}: {self._last_output()}")
-
-    def _last_output(self) -> str:
-        self.output.flush()
-        lines = (self.folder / "output.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        return lines[-1] if lines else "it printed nothing"
+                self.output.seek(0)
+                last = (["it printed nothing"] + self.output.read().strip().splitlines())[-1]
+                raise CommandError(f"the {name} ended with status {process.returncode}: {last}")
 
     def _wait_for(self, done: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Return the first status that is `done`. Raises DemoError after MODE_TIMEOUT_S or at a fault."""
+        """Return the first status that is `done`. Raises CommandError after MODE_TIMEOUT_S or at a fault."""
         deadline_s = time.monotonic() + MODE_TIMEOUT_S
         while time.monotonic() < deadline_s:
             self._check_processes()
             report: dict[str, Any] = self._call("status")
             if report["mode"] == "fault":
-                raise DemoError(f"fault: {report['fault']['message']}")
+                raise CommandError(f"fault: {report['fault']['message']}")
             if done(report):
                 return report
             time.sleep(POLL_S)
-        raise DemoError(f"still {report['mode']} after {MODE_TIMEOUT_S:g} s: {report['fault']}")
+        raise CommandError(f"still {report['mode']} after {MODE_TIMEOUT_S:g} s: {report['fault']}")
 
     def arm(self) -> None:
         self._wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
@@ -177,7 +167,7 @@ class Demo:
 
 @contextmanager
 def running_demo(logs: Path, seed: int, world: Path | None = None) -> Iterator[Demo]:
-    """Yield a demo and end its processes. Raises InterruptedDemoError for KeyboardInterrupt."""
+    """Yield a demo and end its processes. A KeyboardInterrupt then says in which state."""
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
     try:
         demonstration = Demo(folder, logs, seed, world)
@@ -185,7 +175,7 @@ def running_demo(logs: Path, seed: int, world: Path | None = None) -> Iterator[D
             yield demonstration
         except KeyboardInterrupt:
             demonstration.end()
-            raise InterruptedDemoError(demonstration.last_state()) from None
+            raise KeyboardInterrupt(demonstration.last_state()) from None
         finally:
             demonstration.end()
     finally:

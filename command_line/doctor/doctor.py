@@ -38,9 +38,9 @@ from command_line.doctor.host_facts import (
     thread_priority,
     unit_limits,
 )
-from command_line.json_output import print_value
+from command_line.json_output import Answer
 from command_line.screen import GREEN, RED, YELLOW, coloured
-from command_line.shared_options import DEFAULT_CONFIG, Json
+from command_line.shared_options import DEFAULT_CONFIG
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
 from experiments.study.option import Option
@@ -79,7 +79,6 @@ def _given_socket() -> Path | None:
 def doctor(
     *,
     config: Annotated[Path, Option("of the daemon")] = Path(DEFAULT_CONFIG),
-    json: Json = False,
     socket: Annotated[
         Path | None,
         Option(
@@ -88,20 +87,20 @@ def doctor(
             default=_given_socket,
         ),
     ] = None,
-) -> int:
+) -> Answer:
     configuration, findings = examine_configuration(config)
     if configuration is None:
         findings += [*examine_this_python(), _examine_clock()]
     else:
         findings += examine_all(configuration, socket or Path(configuration.status.socket), read_links(ROOT))
-    if json:
-        print_value([each._asdict() for each in findings])
-    else:
-        for each in findings:
-            fix = f"\n       -> {each.fix}" if each.fix else ""
-            print(f"{coloured(*MARKS[each.level])} {each.id:22} {each.text}{fix}")
     failed = any(each.level is Level.FAIL for each in findings)
-    return exit_codes.UNHEALTHY if failed else exit_codes.OK
+    status = exit_codes.UNHEALTHY if failed else exit_codes.OK
+    return Answer([each._asdict() for each in findings], "\n".join(map(_line, findings)), status)
+
+
+def _line(finding: Finding) -> str:
+    fix = f"\n       -> {finding.fix}" if finding.fix else ""
+    return f"{coloured(*MARKS[finding.level])} {finding.id:22} {finding.text}{fix}"
 
 
 def examine_configuration(path: Path) -> tuple[Configuration | None, list[Finding]]:

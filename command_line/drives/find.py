@@ -6,9 +6,9 @@ from typing import Annotated, Any
 from command_line import exit_codes
 from command_line.drives.opened_buses import FD_RATE_KBIT_S, OpenedBus, opened_buses
 from command_line.errors import usage_error
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.screen import GREEN, RED, YELLOW, coloured, watched
-from command_line.shared_options import Json, RobotConfiguration, interface_name
+from command_line.shared_options import RobotConfiguration, interface_name
 from control.computing.suggestion import suggestion
 from drivers.bench.search import SearchResult, expectation_problems, id_problems
 from drivers.drive import DriveParameters
@@ -25,7 +25,6 @@ UNKNOWN = "-"
 def find(
     *,
     config: RobotConfiguration,
-    json: Json = False,
     bus: Annotated[tuple[str, ...], Option("configured bus (default: all)")] = (),
     interface: Annotated[
         str | None, Option("of python-can, such as socketcan, without a configuration", parse=interface_name)
@@ -33,7 +32,7 @@ def find(
     channel: Annotated[str | None, Option("of that interface, such as can0")] = None,
     fd: Annotated[bool, Option("that interface carries CAN FD")] = False,
     type: Annotated[tuple[str, ...], Option("ask drives of this type alone", choices=tuple(DRIVE_BENCHES))] = (),
-) -> int:
+) -> Answer:
     drives: Mapping[str, DriveParameters] = {}
     if interface and channel:
         rate_kbit_s = FD_RATE_KBIT_S if fd else 0
@@ -49,12 +48,9 @@ def find(
     with opened_buses(buses) as opened, watched() as show:
         results = [(each, each.search(type, show)) for each in opened]
     reports = [_report(each, result, drives) for each, result in results]
-    if json:
-        print_json("drives-find", {"buses": reports})
-    else:
-        print("\n\n".join("\n".join(_lines(report)) for report in reports))
+    text = "\n\n".join("\n".join(_lines(report)) for report in reports)
     failed = any(report["problems"] or not report["drives"] for report in reports)
-    return exit_codes.UNHEALTHY if failed else exit_codes.OK
+    return Answer({"buses": reports}, text, exit_codes.UNHEALTHY if failed else exit_codes.OK, "drives-find")
 
 
 def _report(bus: OpenedBus, result: SearchResult, configured: Mapping[str, DriveParameters]) -> dict[str, Any]:

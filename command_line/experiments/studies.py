@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from inspect import signature
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
@@ -53,11 +53,10 @@ Values = dict[str, Any]
 Function = Callable[..., Any]
 
 
-class StudyCommand:
+class StudyCommand(NamedTuple):
     """The command of one study."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    name: str
 
     def functions(self) -> Iterator[Function]:
         """Yield the functions that declare its options: its own, and those of this module that it needs."""
@@ -78,7 +77,11 @@ class StudyCommand:
 
 
 CALIBRATE = StudyCommand("calibrate")  # which is a command of its own
-STUDIES = {name: (StudyCommand(name), text) for name, text in study_texts().items()}
+
+
+def find_commands() -> dict[str, tuple[StudyCommand, str]]:
+    """Return every study of `mudskipper experiment` with its text."""
+    return {name: (StudyCommand(name), text) for name, text in study_texts().items()}
 
 
 def takes_session(function: Function) -> bool:

@@ -2,30 +2,30 @@
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol, TypeVar
 
 from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.key_reference import Key, configuration_keys
 from command_line.init.new_file import NewRobot, drive_keys, new_file
-from command_line.init.questions import Ask, ask, one_of
 from command_line.shared_options import interface_name
 from control.computing.suggestion import suggestion
 from control.geometry import FlipperGeometry
 from control.plate_outline import Corner
 from control.records import FLIPPERS, JOINTS, Rig
-from drivers.drive_types import DRIVE_TYPES
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from experiments.campaign.plate_file import read_corners
 from experiments.study.option import Option
 from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 from firmware_host.configuration.loading import parse_configuration
 
+T = TypeVar("T")
 PRINTED = Path("-")
 FLIPPER_SETS = (*FLIPPERS, "both")
 BASES = ("fixed", "moves")
@@ -76,14 +76,27 @@ def init(
     """Ask for what no option gives; without a terminal, or with `defaults`, the default is the answer."""
     if file != PRINTED and file.exists():
         raise usage_error(f"{file} exists: name another file, or move it away")
-    read = input if sys.stdin.isatty() and not defaults else None
+    ask = asked_on_terminal if sys.stdin.isatty() and not defaults else unasked
     try:
-        robot = _frame(name, flippers, base, read)
-        if from_bus:
-            robot = _from_bus(robot, interface, channel, drive, fd, dict(node or ()), read)
-        else:
-            robot = _described(robot, interface, channel, drive, dict(node or ()), read)
-        text = new_file(robot._replace(geometry=_geometry(plate, dict(set or ()), read)))
+        name = name or ask("name of the robot", NewRobot().name, str)
+        wanted = flippers or ask("flippers: left, right or both", "both", one_of(FLIPPER_SETS))
+        base = base or ask("base: fixed or moves", "moves", one_of(BASES))
+        robot = NewRobot(name, Rig(FLIPPERS if wanted == "both" else (wanted,)), base == "fixed")
+        if not from_bus:
+            types = tuple(DRIVE_TYPES)
+            robot = robot._replace(drive_type=drive or ask(f"drives: {' or '.join(types)}", DEFAULT, one_of(types)))
+        interface = interface or ask("interface of python-can", robot.interface, interface_name)
+        robot = robot._replace(interface=interface, channels=_channels(channel, robot.rig, ask))
+        found = scan(robot, fd, drive) if from_bus else {}
+        for each_channel, drives in found.items():
+            print(
+                f"found on {each_channel}: {', '.join(f'{each.type} {each.node_id}' for each in drives)}",
+                file=sys.stderr,
+            )
+        robot = with_found(robot, found, dict(node)) if found else robot
+        robot = robot._replace(node_ids=_node_ids(dict(node), robot, ask))
+        robot = with_identities(robot, found) if found else robot
+        text = new_file(robot._replace(geometry=_geometry(plate, dict(set), ask)))
     except EOFError:
         return exit_codes.INTERRUPTED
     parse_configuration(text)
@@ -97,58 +110,47 @@ def init(
     return exit_codes.OK
 
 
-def _frame(name: str | None, flippers: str | None, base: str | None, read: Ask | None) -> NewRobot:
-    name = name or ask("name of the robot", NewRobot().name, str, read)
-    wanted = flippers or ask("flippers: left, right or both", "both", one_of(FLIPPER_SETS), read)
-    base = base or ask("base: fixed or moves", "moves", one_of(BASES), read)
-    return NewRobot(name, Rig(FLIPPERS if wanted == "both" else (wanted,)), base == "fixed")
+class Ask(Protocol):
+    """Returns the parsed answer to a question, or the default."""
+
+    def __call__(self, prompt: str, default: T, parse: Callable[[str], T]) -> T: ...
 
 
-def _described(
-    robot: NewRobot,
-    interface: str | None,
-    channels: Sequence[str] | None,
-    drive: str | None,
-    node_ids: Mapping[str, int],
-    read: Ask | None,
-) -> NewRobot:
-    types = tuple(DRIVE_TYPES)
-    drive = drive or ask(f"drives: {' or '.join(types)}", robot.drive_type, one_of(types), read)
-    interface = interface or ask("interface of python-can", robot.interface, interface_name, read)
-    robot = robot._replace(drive_type=drive, interface=interface, channels=_channels(channels, robot.rig, read))
-    return robot._replace(node_ids=_node_ids(node_ids, robot, read))
+def unasked(prompt: str, default: T, parse: Callable[[str], T]) -> T:
+    return default
 
 
-def _from_bus(
-    robot: NewRobot,
-    interface: str | None,
-    channels: Sequence[str] | None,
-    drive: str | None,
-    carries_fd: bool,
-    node_ids: Mapping[str, int],
-    read: Ask | None,
-) -> NewRobot:
-    """Scan the buses, and ask which drive moves which joint. Raises ConfigurationError and BusError."""
-    interface = interface or ask("interface of python-can", robot.interface, interface_name, read)
-    robot = robot._replace(interface=interface, channels=_channels(channels, robot.rig, read))
-    found = scan(robot, carries_fd, drive)
-    for channel, drives in found.items():
-        print(f"found on {channel}: {', '.join(f'{each.type} {each.node_id}' for each in drives)}", file=sys.stderr)
-    robot = with_found(robot, found, node_ids)
-    return with_identities(robot._replace(node_ids=_node_ids(node_ids, robot, read)), found)
+def asked_on_terminal(prompt: str, default: T, parse: Callable[[str], T]) -> T:
+    """Show the default in brackets, which an empty line takes; ask again after an answer that does not fit."""
+    shown = f"{default:.10g}" if isinstance(default, float) else str(default)
+    while line := input(f"{prompt} [{shown}]: ").strip():
+        try:
+            return parse(line)
+        except (ValueError, argparse.ArgumentTypeError) as problem:
+            print(f"  {problem}")
+    return default
 
 
-def _channels(given: Sequence[str] | None, rig: Rig, read: Ask | None) -> tuple[str, ...]:
+def one_of(words: Collection[str]) -> Callable[[str], str]:
+    def parse(line: str) -> str:
+        if line not in words:
+            raise ValueError(f"{line}: must be one of {', '.join(words)}")
+        return line
+
+    return parse
+
+
+def _channels(given: Sequence[str], rig: Rig, ask: Ask) -> tuple[str, ...]:
     """Raises CommandError."""
     text = "its channels, one for all flippers or one for each" if len(rig.flippers) > 1 else "its channel"
-    channels = tuple(given or ask(text, "can0", str, read).replace(",", " ").split())
+    channels = tuple(given or ask(text, "can0", str).replace(",", " ").split())
     if len(channels) not in (1, len(rig.flippers)):
         possible = " or ".join(map(str, sorted({1, len(rig.flippers)})))
         raise usage_error(f"{len(channels)} channels, {', '.join(channels)}: must be {possible} for this rig")
     return channels
 
 
-def _node_ids(given: Mapping[str, int], robot: NewRobot, read: Ask | None) -> dict[str, int]:
+def _node_ids(given: Mapping[str, int], robot: NewRobot, ask: Ask) -> dict[str, int]:
     """Raises CommandError."""
     for joint in given.keys() - set(robot.rig.joints):
         raise usage_error(f"--node {joint}: this rig has no such joint; {suggestion(joint, robot.rig.joints)}")
@@ -157,27 +159,27 @@ def _node_ids(given: Mapping[str, int], robot: NewRobot, read: Ask | None) -> di
     return {
         joint: given[joint]
         if joint in given
-        else ask(f"node id of {joint}", robot.node_id(joint), Option("", *bounds).parse_whole_number, read)
+        else ask(f"node id of {joint}", robot.node_id(joint), Option("", *bounds).parse_whole_number)
         for joint in robot.rig.joints
     }
 
 
-def _geometry(plate: str | None, given: Mapping[str, float], read: Ask | None) -> FlipperGeometry:
+def _geometry(plate: str | None, given: Mapping[str, float], ask: Ask) -> FlipperGeometry:
     """Raises ConfigurationError."""
-    corners = _corners(plate, given, read)
+    corners = _corners(plate, given, ask)
     left_out = {"plate_corners_m", *(SIDES if corners else ())}
     keys = {key.name: key for key in configuration_keys(FlipperGeometry, "geometry") if key.name not in left_out}
-    values = {name: given[name] if name in given else _ask_value(key, read) for name, key in keys.items()}
+    values = {name: given[name] if name in given else _ask_value(key, ask) for name, key in keys.items()}
     return FlipperGeometry(plate_corners_m=corners, **values)
 
 
-def _corners(plate: str | None, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
+def _corners(plate: str | None, given: Mapping[str, float], ask: Ask) -> tuple[Corner, ...]:
     """Return the plate's corners; none for a rectangle. Raises CommandError and ConfigurationError."""
     sides = [name for name in SIDES if name in given]
     if plate and sides:
         raise usage_error(f"--set {sides[0]}: must be left out where --plate gives the plate's corners")
     prompt = f"plate: {RECTANGLE}, or a file of its corners"
-    plate = plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer, read))
+    plate = plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer))
     try:
         return () if plate == RECTANGLE else read_corners(Path(plate))
     except ValueError as problem:
@@ -192,7 +194,7 @@ def _plate_answer(line: str) -> str:
     return line
 
 
-def _ask_value(key: Key, read: Ask | None) -> float:
+def _ask_value(key: Key, ask: Ask) -> float:
     assert key.bounds is not None
     option = Option(key.meaning, *key.bounds)
-    return ask(f"{key.name}: {key.meaning} ({key.unit})", float(key.default), option.parse_number, read)
+    return ask(f"{key.name}: {key.meaning} ({key.unit})", float(key.default), option.parse_number)

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 from command_line import exit_codes
 from command_line.errors import usage_error
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
 from command_line.screen import complain, watched
-from command_line.shared_options import DEFAULT_CONFIG, Json
+from command_line.shared_options import DEFAULT_CONFIG
 from experiments.reports.counted_nouns import counted
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
@@ -65,18 +65,15 @@ def chosen_folder(named: Path | None, config: Path) -> Path:
     return folder
 
 
-def index(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED, json: Json = False) -> int:
+def index(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED) -> Answer:
     from logs.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(folder, config))
     stored = _update(catalogue, broken_again=True)
     states = [entry.state for entry in catalogue.entries()]
     report = {"catalogue": str(catalogue.path), "logs": len(states), "broken": states.count("broken")}
-    if json:
-        print_json("log-index", report)
-    else:
-        print(f"{report['catalogue']}: {counted(len(states), 'log')}, {report['broken']} broken")
-    return exit_codes.OK if stored else exit_codes.UNHEALTHY
+    text = f"{report['catalogue']}: {counted(len(states), 'log')}, {report['broken']} broken"
+    return Answer(report, text, exit_codes.OK if stored else exit_codes.UNHEALTHY, "log-index")
 
 
 def query(
@@ -84,18 +81,14 @@ def query(
     folder: Folder = None,
     *,
     config: FolderConfiguration = CONFIGURED,
-    json: Json = False,
-) -> int:
+) -> Answer:
     from logs.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(folder, config))
     _update(catalogue)
     names, rows = catalogue.query(sql)
-    if json:
-        print_json("log-query", {"rows": [dict(zip(names, map(_for_json, row), strict=True)) for row in rows]})
-    else:
-        print(table([names, *([value_shown(value) for value in row] for row in rows)]))
-    return exit_codes.OK
+    report = {"rows": [dict(zip(names, map(_for_json, row), strict=True)) for row in rows]}
+    return Answer(report, table([names, *([value_shown(value) for value in row] for row in rows)]), schema="log-query")
 
 
 def _for_json(value: Any) -> Any:

@@ -9,12 +9,11 @@ from typing import Annotated, Literal
 
 from command_line import exit_codes
 from command_line.errors import usage_error
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.logs.lab_findings import chosen_vertical, complain_of
 from command_line.logs.log_options import MOST, LogFiles, Segments, Vertical, Walk
 from command_line.logs.refusals import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, other_surface, stride_line, watched
-from command_line.shared_options import Json
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
 from experiments.reports.shown_values import value_shown
@@ -39,13 +38,12 @@ LONGEST_FILM_S = 60.0
 def replay(
     files: LogFiles,
     *,
-    json: Json = False,
     config: Annotated[Path | None, Option("use this configuration (default: the one in the log)")] = None,
     method: Annotated[
         Literal["default", "paper"] | None, Option("estimate by this method (default: the configured one)")
     ] = None,
     vertical: Vertical = None,
-) -> int:
+) -> Answer:
     chosen_vertical(vertical, files[0])
     configuration = load_configuration(config) if config else None
     with watched() as watch:
@@ -56,16 +54,12 @@ def replay(
         stride_report(stride) | {"chosen_depth_m": known(depth_m)}
         for stride, depth_m in zip(replayed.strides, chosen_m, strict=True)
     ]
-    if json:
-        report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
-        findings = finding_reports(path, replayed.findings)
-        print_json("replay", report | {"complete": replayed.complete, "findings": findings})
-        return exit_codes.OK
     complain_of(path, replayed.findings)
-    print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
+    lines = [f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}"]
+    lines.append(f"{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
-        print(f"{stride_line(report, replayed.begin_s)}  {forces}{other_surface(report)}")
+        lines.append(f"{stride_line(report, replayed.begin_s)}  {forces}{other_surface(report)}")
     if not strides:
         complain("no complete stride in this log")
     if replayed.segment:
@@ -74,7 +68,9 @@ def replay(
             "the first strides can differ from those computed live"
         )
     complain_of_end(files, replayed.complete)
-    return exit_codes.OK
+    report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
+    report |= {"complete": replayed.complete, "findings": finding_reports(path, replayed.findings)}
+    return Answer(report, "\n".join(lines), schema="replay")
 
 
 def plot(
@@ -168,7 +164,7 @@ def _chosen_strides(file: Path, numbers: Sequence[int], walk: RecordedWalk, movi
     return strides
 
 
-def info(files: Segments, *, vertical: Vertical = None, json: Json = False) -> int:
+def info(files: Segments, *, vertical: Vertical = None) -> Answer:
     axis, path = chosen_vertical(vertical, files[0]), files[0]
     if len(files) == 1 and is_lab_csv(path):
         lab = read_lab_csv(path, axis)
@@ -177,9 +173,6 @@ def info(files: Segments, *, vertical: Vertical = None, json: Json = False) -> i
     else:
         with watched() as watch:
             summary, findings = log_summary(scan_logs(files, watch)), ()
-    if json:
-        print_json("log-info", summary)
-    else:
-        print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
-        complain_of(path, findings)
-    return exit_codes.OK
+    complain_of(path, findings)
+    text = table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"])
+    return Answer(summary, text, schema="log-info")

@@ -9,12 +9,11 @@ from mcap.reader import make_reader
 
 from command_line import exit_codes
 from command_line.errors import usage_error
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
 from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
-from command_line.operation.trial import KeyValues, show
+from command_line.operation.trial import KeyValues, trial_text
 from command_line.screen import complain, watched
-from command_line.shared_options import Json
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
 from firmware_host.log.log_folder import (
@@ -42,7 +41,7 @@ LEGEND = (
 )
 
 
-def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED, json: Json = False) -> int:
+def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED) -> Answer:
     folder = chosen_folder(folder, config)
     entries = catalogued(folder)
     paths = {*stored_files(folder), *log_files(folder, PRESERVED), *entries}
@@ -55,11 +54,7 @@ def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED
         "disk_bytes": disk_usage(folder).total,
         "free_bytes": space.free_bytes,
     }
-    if json:
-        print_json("log-list", report)
-    else:
-        print(_listing(report))
-    return exit_codes.OK
+    return Answer(report, _listing(report), schema="log-list")
 
 
 def describe(path: Path, entry: LogEntry | None) -> dict[str, Any]:
@@ -133,22 +128,20 @@ def recover(
     places: Annotated[tuple[Path, ...], Option("(default: the configured folder)", metavar="FILE|DIR")] = (),
     *,
     config: FolderConfiguration = CONFIGURED,
-    json: Json = False,
-) -> int:
+) -> Answer:
     given = places or (configured_folder(config),)
     named = {path for path in given if not path.is_dir()}
     paths = [path for each in given for path in ([each] if each in named else unfinished_files(each))]
     recovered, problems = _recover_each(paths, named)
-    if json:
-        logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
-        print_json("log-recover", {"recovered": logs, "problems": problems})
-    else:
-        for log in recovered:
-            print(f"{log.path}: {log.note}")
-        if not recovered and not problems:
-            print("nothing to recover")
+    logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
+    lines = [f"{log.path}: {log.note}" for log in recovered]
     complain(*problems)
-    return exit_codes.UNHEALTHY if problems else exit_codes.OK
+    return Answer(
+        {"recovered": logs, "problems": problems},
+        "\n".join(lines or ["nothing was recovered" if problems else "nothing to recover"]),
+        exit_codes.UNHEALTHY if problems else exit_codes.OK,
+        "log-recover",
+    )
 
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[str]]:
@@ -171,7 +164,7 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
     return recovered, problems
 
 
-def annotate_log(file: Annotated[Path, Option("log of this project")], values: KeyValues, *, json: Json = False) -> int:
+def annotate_log(file: Annotated[Path, Option("log of this project")], values: KeyValues) -> Answer:
     """Add the description to the log itself; its rows stay as they are."""
     try:
         trial = annotate(file, dict(values))
@@ -181,11 +174,7 @@ def annotate_log(file: Annotated[Path, Option("log of this project")], values: K
         raise
     except ValueError as problem:
         raise usage_error(str(problem)) from None
-    if json:
-        print_json("log-annotate", {"log": str(file), "trial": trial})
-    else:
-        show({"": trial})
-    return exit_codes.OK
+    return Answer({"log": str(file), "trial": trial}, trial_text({"": trial}), schema="log-annotate")
 
 
 def preserve_log(

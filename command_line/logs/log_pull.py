@@ -13,9 +13,8 @@ from typing import Annotated
 
 from command_line import exit_codes
 from command_line.errors import CommandError
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.screen import complain
-from command_line.shared_options import Json
 from experiments.reports.counted_nouns import counted
 from experiments.study.option import Option
 from experiments.study.values import folder
@@ -31,9 +30,7 @@ SSH = f"--rsh=ssh -o ConnectTimeout={SILENT_S}"
 def pull(
     robot: Annotated[str, Option("robot: or user@robot:FOLDER, or a folder here", metavar="ROBOT:[FOLDER]")],
     into: Annotated[Path, Option("for the logs", metavar="DIR", parse=folder)] = Path("robot-logs"),
-    *,
-    json: Json = False,
-) -> int:
+) -> Answer:
     source = f"{robot}{ROBOTS_LOGS}" if robot.endswith(":") else robot.rstrip("/")
     if ":" not in robot and not Path(robot).is_dir():
         raise CommandError(f"{robot}: there is no such folder, and a robot's name ends with a colon: '{robot}:'")
@@ -52,18 +49,15 @@ def pull(
         ) from None
     same = [path for path in logs if path.name not in different]
     _mark(source, into, same)
-    report = {"folder": str(into), "copied": [path.name for path in same], "different": different}
-    if json:
-        print_json("log-pull", report)
-    else:
-        print(f"{into}: {counted(len(same), 'log')} copied, compared and marked on the robot")
     complain(
         *(
             f"{name}: differs from the robot's and is not marked: move it away here, and repeat the command"
             for name in different
         )
     )
-    return exit_codes.UNHEALTHY if different else exit_codes.OK
+    report = {"folder": str(into), "copied": [path.name for path in same], "different": different}
+    text = f"{into}: {counted(len(same), 'log')} copied, compared and marked on the robot"
+    return Answer(report, text, exit_codes.UNHEALTHY if different else exit_codes.OK, "log-pull")
 
 
 def _rsync(source: str, arguments: Sequence[str]) -> str:

@@ -8,11 +8,10 @@ from textwrap import fill
 from typing import Annotated
 
 from command_line import exit_codes
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.logs.lab_findings import chosen_vertical, complain_of
 from command_line.logs.log_options import Vertical
 from command_line.screen import watched
-from command_line.shared_options import Json
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths, layout_of_track
 from experiments.run_report.page import report_of
 from experiments.run_report.run import read_runs
@@ -48,8 +47,7 @@ def log_report(
     mud: Muds = (),
     world: Annotated[Path | None, Option("of the simulated robot: names the muds", alternative="mud")] = None,
     vertical: Vertical = None,
-    json: Json = False,
-) -> int:
+) -> Answer:
     axis = chosen_vertical(vertical, files[0])
     layout = _layout(mud, world)
     with watched() as watch:
@@ -65,12 +63,9 @@ def log_report(
     for run in runs:
         complain_of(run.paths[0], run.replay.findings)
     print(fill(result.texts["Result"].partition("\n\n")[0], TERMINAL), file=sys.stderr)
-    if json:
-        print_json(f"log-{name}", result.json())
-    else:
-        print(out / PAGE)
     print(f"written  {len(written)} files in {out}", file=sys.stderr)
-    return exit_codes.OK if result.ending is Ending.DONE else exit_codes.UNHEALTHY
+    status = exit_codes.OK if result.ending is Ending.DONE else exit_codes.UNHEALTHY
+    return Answer(result.json(), str(out / PAGE), status, f"log-{name}")
 
 
 def _layout(mud: Sequence[tuple[str, float]], world: Path | None) -> MudLayout | None:

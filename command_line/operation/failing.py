@@ -2,11 +2,10 @@
 
 from typing import Annotated, Any
 
-from command_line import exit_codes
 from command_line.errors import usage_error
-from command_line.json_output import print_json, print_value
+from command_line.json_output import Answer
 from command_line.operation.operation import connect
-from command_line.shared_options import Json, Socket
+from command_line.shared_options import Socket
 from experiments.reports.text_tables import table
 from experiments.study.option import Option
 
@@ -20,33 +19,23 @@ def fail(
     ] = None,
     *,
     socket: Socket,
-    json: Json = False,
     seconds: Annotated[float, Option("seconds until it ends", unit="s", name="--for")] = 2.0,
     list: Annotated[bool, Option("list what can fail, how, and what fails now")] = False,
-) -> int:
+) -> Answer:
     if list and component is not None:
         raise usage_error("fail --list takes neither COMPONENT nor KIND")
     if not list and (component is None or kind is None):
         raise usage_error("fail needs a COMPONENT and a KIND, or --list")
     with connect(socket) as client:
-        if list:
-            _show(client.call("failures"), json)
-            return exit_codes.OK
-        failing = client.call("fail", component=component, kind=kind, for_s=seconds)
-    if json:
-        print_value(failing)
+        if not list:
+            failing = client.call("fail", component=component, kind=kind, for_s=seconds)
+            return Answer(failing, failing_table(failing))
+        report = client.call("failures")
+    if report["allowed"]:
+        text = f"{families_table(report['table'])}\n\n{failing_table(report['failing'])}"
     else:
-        print(failing_table(failing))
-    return exit_codes.OK
-
-
-def _show(report: dict[str, Any], as_json: bool) -> None:
-    if as_json:
-        print_json("failures", report)
-    elif report["allowed"]:
-        print(f"{families_table(report['table'])}\n\n{failing_table(report['failing'])}")
-    else:
-        print("deliberate failures are not allowed: failures.allowed is false in the configuration")
+        text = "deliberate failures are not allowed: failures.allowed is false in the configuration"
+    return Answer(report, text, schema="failures")
 
 
 def families_table(rows: list[dict[str, Any]]) -> str:

@@ -13,8 +13,7 @@ from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
 from command_line.errors import CommandError, usage_error
-from command_line.json_output import print_value
-from command_line.operation.attended_walk import attend
+from command_line.json_output import Answer
 from command_line.operation.mode_output import print_mode
 from command_line.robot_text import (
     MILD,
@@ -36,7 +35,6 @@ from command_line.robot_text import (
 )
 from command_line.screen import GREEN, RED, coloured, complain
 from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
-from control.computing.suggestion import suggestion
 from drivers.can.run_folder import find_run_folder
 from experiments.reports.text_tables import table
 from experiments.study.option import Option
@@ -57,14 +55,11 @@ def connect(socket: Path) -> closing[StatusClient]:
     return closing(StatusClient(socket))
 
 
-def status(*, socket: Socket, json: Json = False) -> int:
+def status(*, socket: Socket) -> Answer:
     with connect(socket) as client:
         report = client.call("status")
-    if json:
-        print_value(report)
-    else:
-        print(status_text(report))
-    return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
+    failed = report["mode"] in ("fault", "damping")
+    return Answer(report, status_text(report), exit_codes.UNHEALTHY if failed else exit_codes.OK)
 
 
 def arm(
@@ -122,6 +117,8 @@ def walk(
         depths_m = [each / 100.0 for each in depth]
         params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}
     if attended:
+        from command_line.operation.attended_walk import attend  # `status` does without it
+
         with connect(socket) as client:
             return attend(client, json, params)
     return _change_mode("walk", "walking", socket, json, params)
@@ -129,7 +126,8 @@ def walk(
 
 def joint_angle(text: str) -> tuple[str, float]:
     """Parse a joint and its angle in degrees."""
-    from control.records import JOINTS  # imports too much for `status`
+    from control.computing.suggestion import suggestion  # `status` does without them
+    from control.records import JOINTS
 
     joint, _, angle_deg = text.partition("=")
     if joint and joint not in JOINTS:
@@ -253,9 +251,8 @@ def _poll(client: StatusClient, done: Callable[[Report], bool], longest_s: float
 def check(
     *,
     socket: Socket,
-    json: Json = False,
     config: Annotated[Path, Option("used without a daemon")] = Path(DEFAULT_CONFIG),
-) -> int:
+) -> Answer:
     """Ask the daemon; where none runs, check what it would need."""
     try:
         with connect(socket) as client:
@@ -266,13 +263,13 @@ def check(
         from command_line.doctor.doctor import check_without_daemon  # imports too much for `status`
 
         items = check_without_daemon(config, str(problem))
-    if json:
-        print_value(items)
-    else:
-        for item in items:
-            if not item.get("cause"):
-                print(_check_text(item, [each["id"] for each in items if each.get("cause") == item["id"]]))
-    return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
+    texts = [
+        _check_text(item, [each["id"] for each in items if each.get("cause") == item["id"]])
+        for item in items
+        if not item.get("cause")
+    ]
+    is_ready = all(item["ok"] for item in items)
+    return Answer(items, "\n".join(texts), exit_codes.OK if is_ready else exit_codes.UNHEALTHY)
 
 
 def _check_text(item: Report, following: list[str]) -> str:

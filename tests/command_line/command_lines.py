@@ -34,22 +34,17 @@ def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProc
     )
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def refusal(*arguments: str) -> str:
     """Return the message with which a command line is refused as wrong usage."""
-    return _complaint(capsys, exit_codes.USAGE, arguments)
+    return failure(*arguments, status=exit_codes.USAGE)
 
 
-def failure(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def failure(*arguments: str, status: int = exit_codes.UNHEALTHY) -> str:
     """Return the message of a command that failed."""
-    return _complaint(capsys, exit_codes.UNHEALTHY, arguments)
-
-
-def _complaint(capsys: pytest.CaptureFixture[str], status: int, arguments: Sequence[str]) -> str:
-    ended = _status(arguments)
-    printed = capsys.readouterr()
-    assert (ended, printed.out) == (status, "")
-    assert "Traceback" not in printed.err
-    return printed.err.splitlines()[-1]
+    ended = run(*arguments)
+    assert (ended.returncode, ended.stdout) == (status, "")
+    assert "Traceback" not in ended.stderr
+    return ended.stderr.splitlines()[-1]
 
 
 def _status(arguments: Sequence[str]) -> int:

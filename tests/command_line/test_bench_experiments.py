@@ -49,11 +49,6 @@ def test_without_its_page_the_same_command_measures_nothing_twice(
     assert json.loads(capsys.readouterr().out)["experiment"] == "flipper"
 
 
-def test_another_depth_is_another_experiment(first: int, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*FLIPPER, "--depth", "4", "--out", str(folder)]) == exit_codes.REFUSED
-    assert "depth_m = 0.03" in capsys.readouterr().err
-
-
 def test_a_walk_reads_the_flippers_summary_as_its_truth(
     first: int, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,15 +56,6 @@ def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentPa
                 yield from commands_of(command)
 
 
-def test_json_is_spelled_alike_everywhere() -> None:
-    parser = build_parser()
-    complete(parser)
-    found = [action for command in commands_of(parser) for action in command._actions if "--json" in str(action)]
-    actions = [action for action in found if action.option_strings == ["--json"]]
-    assert len(actions) == len(found) > 20
-    assert {(action.nargs, action.const, action.help) for action in actions} == {(0, True, "print JSON for programs")}
-
-
 def test_every_argument_is_explained_and_every_value_is_named() -> None:
     parser = build_parser()
     complete(parser)

@@ -224,16 +224,14 @@ def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Pat
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
-def test_an_unknown_walk_and_an_unwritable_file_are_refused(
-    command: str, log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert "no walk 3, only 2" in failure(capsys, command, str(log), "--walk", "3")
+def test_an_unknown_walk_and_an_unwritable_file_are_refused(command: str, log: Path) -> None:
+    assert "no walk 3, only 2" in failure(command, str(log), "--walk", "3")
     out = log.parent / "nowhere" / "x.png"
-    assert f"{out} cannot be written" in failure(capsys, command, str(log), "--out", str(out))
+    assert f"{out} cannot be written" in failure(command, str(log), "--out", str(out))
 
 
-def test_an_unknown_stride_is_wrong_usage(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    message = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
+def test_an_unknown_stride_is_wrong_usage(log: Path) -> None:
+    message = refusal("film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
     assert "--stride 2: this walk has 0 to 1" in message
 
 
@@ -245,17 +243,13 @@ def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command_line.logs.log_commands, "read_walk", read)
 
 
-def test_without_strides_there_is_nothing_to_film(
-    log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert "no complete stride" in failure(capsys, "film", str(log), "--walk", "1")
+def test_without_strides_there_is_nothing_to_film(log: Path, no_strides: None) -> None:
+    assert "no complete stride" in failure("film", str(log), "--walk", "1")
 
 
-def test_a_film_without_end_is_refused(
-    log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_film_without_end_is_refused(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command_line.logs.log_commands, "LONGEST_FILM_S", 2.0)
     monkeypatch.setattr(experiments.pictures.stride_film, "FRAMES_PER_S", 2)
     out = str(log.with_suffix(".gif"))
-    assert "choose with --stride" in refusal(capsys, "film", str(log), "--walk", "1", "--out", out)
+    assert "choose with --stride" in refusal("film", str(log), "--walk", "1", "--out", out)
     assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK

@@ -255,7 +255,7 @@ def test_a_wrong_input_is_refused_with_its_status_and_its_name(
     status: int, line: str, named: str, inputs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(inputs)
-    monkeypatch.setattr("command_line.demo.demo._end_on_signals", lambda: None)
+    monkeypatch.setattr("command_line.demo.demo.ENDING_SIGNALS", ())
     monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
     before = set(inputs.iterdir())
     ended = run(*line.split(), MUDSKIPPER_SOCKET="/none.sock")

@@ -28,15 +28,13 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path / "here")
 
 
-def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    assert "no such folder" in failure(capsys, *LABLOGS, str(tmp_path / "missing"))
-    assert "holds no log" in refusal(capsys, *LABLOGS, str(tmp_path))
+def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(tmp_path: Path) -> None:
+    assert "no such folder" in failure(*LABLOGS, str(tmp_path / "missing"))
+    assert "holds no log" in refusal(*LABLOGS, str(tmp_path))
     (tmp_path / "pond.csv").write_text("no log")
-    assert "must be a pattern and a name" in refusal(capsys, *LABLOGS, str(tmp_path), "--group", "pond*")
-    assert "'lake*'" in refusal(capsys, *LABLOGS, str(tmp_path), "--group", "lake*=wet")
-    assert "'air*'" in refusal(capsys, *LABLOGS, str(tmp_path), "--air", "air*")
+    assert "must be a pattern and a name" in refusal(*LABLOGS, str(tmp_path), "--group", "pond*")
+    assert "'lake*'" in refusal(*LABLOGS, str(tmp_path), "--group", "lake*=wet")
+    assert "'air*'" in refusal(*LABLOGS, str(tmp_path), "--air", "air*")
 
 
 def test_a_folder_without_a_readable_log_names_each_reason(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -96,13 +96,6 @@ def test_another_mud_is_added_to_the_report(
     assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
 
 
-def test_a_missing_port_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    port = str(tmp_path / "ttyNONE")
-    status, _, reported = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
-    assert status == exit_codes.REFUSED
-    assert f"there is no serial port {port}" in reported
-
-
 def test_a_simulated_manual_stage_with_an_encoder_finds_the_mud_as_well(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -127,14 +127,6 @@ def test_a_file_without_a_plate_is_refused(
     assert words in capsys.readouterr().err
 
 
-def test_each_flipper_may_have_its_own_bus() -> None:
-    robot, _ = answered([], "--channel", "can0", "--channel", "can1")
-    configuration = parse_configuration(new_file(robot))
-    assert {joint: configuration.bus[each.bus].channel for joint, each in configuration.drive.items()} == {
-        joint: "can0" if joint.startswith("left") else "can1" for joint in JOINTS
-    }
-
-
 @pytest.mark.parametrize("length_m", [0.08, 0.2, 0.5])
 def test_depths_and_force_follow_the_geometry(length_m: float) -> None:
     robot = NewRobot(geometry=FlipperGeometry(flipper_length_m=length_m))

@@ -73,15 +73,6 @@ def test_a_page_that_stays_open_shows_the_daemon_that_was_started_again(own_benc
         assert page.wait_for("ticks")[-1]["stamp_s"] > before["stamp_s"]
 
 
-def test_a_page_asks_the_program_that_was_started_again(own_bench: Bench) -> None:
-    with serving(own_bench) as port:
-        page = Page(port)
-        before = page.wait_for("ticks")[-1]
-    assert page.ask() == {"number": -1}
-    with serving(own_bench, port):
-        assert page.wait_for("ticks")[-1]["tick"] > before["tick"]
-
-
 def test_a_page_continues_after_both_were_stopped_and_the_program_started_first(own_bench: Bench) -> None:
     """Until a daemon answers, the program knows no robot, and the page keeps the one that it draws."""
     with serving(own_bench) as port:

@@ -100,9 +100,9 @@ def received(socket: ClientConnection, server: ViewerServer, row_of: Callable[[i
     raise AssertionError("no data message came")
 
 
-def test_a_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str], short_folder: Path) -> None:
+def test_a_port_in_use_is_one_sentence(short_folder: Path) -> None:
     server = ViewerServer("127.0.0.1", 0)
     arguments = ("live", "--socket", str(short_folder / "s"), "--port", str(server.port))
-    assert "choose another --port" in failure(capsys, *arguments)
-    assert "choose another --port" in failure(capsys, *arguments, "--page")
+    assert "choose another --port" in failure(*arguments)
+    assert "choose another --port" in failure(*arguments, "--page")
     server.close()

@@ -42,7 +42,7 @@ def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.Ca
 def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = catalogue_path(folder)
     duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
-    assert "update mudskipper" in failure(capsys, "log", "query", "select 1", str(folder))
+    assert "update mudskipper" in failure("log", "query", "select 1", str(folder))
     assert main(["log", "list", str(folder)]) == exit_codes.OK
     printed = capsys.readouterr()
     assert "walk.mcap" in printed.out and "update mudskipper" in printed.err

@@ -29,18 +29,18 @@ def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
     assert names == {f"walk_0_1-{part}.parquet" for part in ("ticks", "strides", "events")}
 
 
-def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path) -> None:
     path = tmp_path / "walk.csv"
     path.write_text("before", encoding="utf-8")
     with files_of_at_most(100_000):
-        message = failure(capsys, "log", "export", "--csv", LOG, "--out", str(path))
+        message = failure("log", "export", "--csv", LOG, "--out", str(path))
     assert f"{path}: nothing was written" in message
     assert [(each, each.read_text(encoding="utf-8")) for each in tmp_path.iterdir()] == [(path, "before")]
 
 
-def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_parquet_into_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    message = refusal(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
+    message = refusal("log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
     assert "name a folder" in message
 
 
@@ -64,7 +64,7 @@ def test_an_export_of_a_log_that_was_cut_off_has_everything_before_and_says_so(
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_log_that_is_cut_off_during_an_export_is_refused(
-    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, out = tmp_path / "walk.mcap", tmp_path / FORMS[form]
     log.write_bytes(Path(LOG).read_bytes())
@@ -75,6 +75,6 @@ def test_a_log_that_is_cut_off_during_an_export_is_refused(
         return scanned
 
     monkeypatch.setattr(log_export, "scan_logs", scan_before_cut)
-    message = failure(capsys, "log", "export", form, str(log), "--out", str(out))
+    message = failure("log", "export", form, str(log), "--out", str(out))
     assert message.count("was cut off while it was read") == 1
     assert not any(path.is_file() for path in (out, *out.glob("*")))

@@ -181,7 +181,7 @@ def log(two_walks: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
 
 
-def test_logs_that_cannot_be_read_are_refused_by_name(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_logs_that_cannot_be_read_are_refused_by_name(log: Path) -> None:
     folder = log.parent
     text, broken, missing = folder / "notes.txt", folder / "broken.mcap", folder / "missing.mcap"
     text.write_text("no log", encoding="utf-8")
@@ -190,7 +190,7 @@ def test_logs_that_cannot_be_read_are_refused_by_name(log: Path, capsys: pytest.
     broken.write_bytes(contents[: len(contents) // 2] + bytes(4000) + contents[len(contents) // 2 + 4000 :])
     for path in (text, broken, missing, folder / "table.csv"):
         for words in ([str(path)], [str(log), str(path)]):
-            message = failure(capsys, "log", "report", *words, "--out", str(folder / "out"))
+            message = failure("log", "report", *words, "--out", str(folder / "out"))
             assert message.startswith(f"mudskipper: {path}: ")
     assert not (folder / "out").exists()
 
@@ -203,14 +203,14 @@ def test_a_log_that_is_cut_off_is_named_in_headline_json_and_exit_status(log: Pa
     assert ended.stderr.startswith("two ends early: ")
 
 
-def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert f"{log}: given twice" in failure(capsys, "log", "report", str(log), str(log))
+def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path) -> None:
+    assert f"{log}: given twice" in failure("log", "report", str(log), str(log))
     (log.parent / "file").write_text("", encoding="utf-8")
-    assert "Not a directory" in failure(capsys, "log", "report", str(log), "--out", str(log.parent / "file" / "out"))
+    assert "Not a directory" in failure("log", "report", str(log), "--out", str(log.parent / "file" / "out"))
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
-def test_several_muds_need_a_position(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_several_muds_need_a_position(tmp_path: Path) -> None:
     log = str(LAB_LOGS / "single_12.5N_trial5.csv.gz")
     words = ("--mud", "48.5", "--mud", "53.1", "--out", str(tmp_path))
-    assert "no position of the body" in failure(capsys, "log", "report", log, *words)
+    assert "no position of the body" in failure("log", "report", log, *words)

@@ -70,7 +70,7 @@ def test_a_full_disk_leaves_no_copy_that_is_cut(
 
 
 def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
-    tmp_path: Path, configuration: Configuration, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, configuration: Configuration
 ) -> None:
     """Another walk and a long rest come before the experiment's own walk."""
     parameters = LogParameters(directory=str(tmp_path / "logs"), segment_s=1.0)

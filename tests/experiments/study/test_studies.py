@@ -68,9 +68,7 @@ def test_one_file_is_a_command_with_its_table_page_and_numbers(
 @pytest.mark.parametrize(
     "wrong", ["", "--simulated --depth 30", "--simulated --depth deep", "--simulated --seeds 0", "--simulated --fog 1"]
 )
-def test_options_outside_of_their_declaration_are_refused(
-    wrong: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_options_outside_of_their_declaration_are_refused(wrong: str, folder: Path) -> None:
     try:
         status: object = main(["experiment", NAME, *wrong.split()])
     except SystemExit as ended:
