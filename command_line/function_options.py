@@ -33,7 +33,8 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
         else:
             action = groups[alternative].add_argument(each.parameter, **_keywords(each))
         action.offers = each.option.offers  # for the completion of shells
-    if any(function.__annotations__.get("return") is Answer for function in functions):
+    answers = any(function.__annotations__.get("return") is Answer for function in functions)
+    if answers and "json" not in declared:
         parser.add_argument(JSON, action="store_true", help="print JSON for programs")
 
 

@@ -36,7 +36,7 @@ SCHEMAS = {  # what prints it -> version
 class Answer(NamedTuple):
     """What a command has found, for programs and for people. A command that returns one has the option --json."""
 
-    report: Any
+    report: Any  # None: `main` prints the error of the command
     text: str
     status: int = exit_codes.OK
     schema: str = ""  # a key of SCHEMAS, unless the report is a list or has its schema already
@@ -44,21 +44,12 @@ class Answer(NamedTuple):
     def print(self, as_json: bool) -> int:
         """Print it, and return the exit status."""
         if not as_json:
-            print(self.text)
-        elif self.schema:
-            print_json(self.schema, self.report)
-        else:
-            print_value(self.report)
+            print(*filter(None, [self.text]))
+        elif self.report is not None:
+            print_value(
+                {"schema": f"{self.schema}/{SCHEMAS[self.schema]}"} | self.report if self.schema else self.report
+            )
         return self.status
-
-
-def with_schema(name: str, report: dict[str, Any]) -> dict[str, Any]:
-    """Put name and version of the shape before the report. Raises KeyError for one that is not in SCHEMAS."""
-    return {"schema": f"{name}/{SCHEMAS[name]}"} | report
-
-
-def print_json(name: str, report: dict[str, Any]) -> None:
-    print_value(with_schema(name, report))
 
 
 def print_value(value: Any) -> None:
@@ -71,4 +62,5 @@ def print_value(value: Any) -> None:
 
 def print_error(status: int, messages: Sequence[str]) -> None:
     """Print why a command failed, in the one shape of all commands."""
-    print_json("error", {"status": status, "meaning": exit_codes.MEANINGS[status], "messages": list(messages)})
+    error = {"status": status, "meaning": exit_codes.MEANINGS[status], "messages": list(messages)}
+    Answer(error, "", schema="error").print(as_json=True)

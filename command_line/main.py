@@ -42,7 +42,7 @@ def _run(given: Sequence[str]) -> int:
         if hasattr(target, "run"):  # a study, which several functions run
             return int(target.run(options))
         ended: Answer | int = target(**given_options(options, target))
-        return ended.print(options.json) if isinstance(ended, Answer) else ended
+        return ended.print(getattr(options, "json", False)) if isinstance(ended, Answer) else ended
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed it

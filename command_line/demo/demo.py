@@ -16,7 +16,7 @@ import numpy as np
 from command_line import exit_codes
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, running_demo
 from command_line.errors import CommandError, missing_library
-from command_line.json_output import print_json
+from command_line.json_output import Answer
 from command_line.robot_text import Report, machine_lines
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from command_line.shared_options import Json, Seed
@@ -43,7 +43,7 @@ def demo(
         float | None, Option("fixed insertion depth (default: adaptive)", unit="cm", low=0.5, high=20.0)
     ] = None,
     world: Annotated[Path | None, Option("describes the ground (default: three muds)")] = None,
-) -> int:
+) -> Answer:
     for number in ENDING_SIGNALS:  # each ends the demo as Ctrl-C does
         if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, signal.default_int_handler)
@@ -63,9 +63,7 @@ def demo(
         raise CommandError(str(problem) or "stopped", status=exit_codes.INTERRUPTED) from None
     except (NoDaemonError, CallRefusedError) as problem:
         raise CommandError(str(problem)) from None
-    if json:
-        print_json("demo", summary)
-    return exit_codes.OK
+    return Answer(summary, "", schema="demo")
 
 
 def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -> tuple[Report, Demo]:

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 from command_line import exit_codes
-from command_line.operation.mode_output import print_mode
+from command_line.json_output import Answer
+from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, position_text, stride_text
 from command_line.screen import complain
 from operator_client.status_client import CallRefusedError, StatusClient
@@ -28,7 +29,7 @@ class LawError(Exception):
     """A control law cannot go on; the message says why."""
 
 
-def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law | None = None) -> int:
+def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law | None = None) -> Answer:
     """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     try:
@@ -41,7 +42,7 @@ def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law
         client.call("stop")
         report, status = _renew(client, as_json), exit_codes.INTERRUPTED
     client.call("release")
-    return _conclude(report, as_json, status)
+    return _conclude(report, status)
 
 
 def _renew(client: StatusClient, as_json: bool, law: Law | None = None) -> dict[str, Any]:
@@ -64,15 +65,14 @@ def _renew(client: StatusClient, as_json: bool, law: Law | None = None) -> dict[
         time.sleep(POLL_S if law else RENEWAL_S)
 
 
-def _conclude(report: dict[str, Any], as_json: bool, status: int) -> int:
-    """Print why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
+def _conclude(report: dict[str, Any], status: int) -> Answer:
+    """Say why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
     fault = report["fault"]
     is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
-    print_mode("walk", as_json, report["mode"], reached=is_sound)
-    if is_sound:
-        return status
-    complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
-    return exit_codes.REFUSED
+    if not is_sound:
+        complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
+        status = exit_codes.REFUSED
+    return mode_answer("walk", report["mode"], status=status)
 
 
 class LiveLine:

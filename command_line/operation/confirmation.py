@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 from command_line import exit_codes
 from command_line.errors import explain
-from command_line.operation.mode_output import print_mode
+from command_line.json_output import Answer
+from command_line.operation.mode_output import mode_answer
 from command_line.screen import complain
-from command_line.shared_options import Json, Socket
+from command_line.shared_options import Socket
 from firmware_host.sockets.rpc import FOR_MEMBERS
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
@@ -87,22 +88,19 @@ def end_motion(path: Path, method: str) -> Ended:
         return Ended(status, "; ".join(messages))
 
 
-def stop(*, socket: Socket, json: Json = False) -> int:
-    return _end("stop", socket, json)
+def stop(*, socket: Socket) -> Answer:
+    return _end("stop", socket)
 
 
-def disarm(*, socket: Socket, json: Json = False) -> int:
-    return _end("disarm", socket, json)
+def disarm(*, socket: Socket) -> Answer:
+    return _end("disarm", socket)
 
 
-def _end(command: str, socket: Path, as_json: bool) -> int:
+def _end(command: str, socket: Path) -> Answer:
     ended = end_motion(socket, command)
-    confirmed = ended.status == exit_codes.OK
-    if ended.mode:
-        print_mode(command, as_json, ended.mode, ended.notice, reached=confirmed)
-    if not confirmed:
+    if ended.status != exit_codes.OK:
         complain(ended.text, TORQUE_UNKNOWN)
-    return ended.status
+    return mode_answer(command, ended.mode, ended.notice, ended.status)
 
 
 def send_order(path: Path, method: str, **params: Any) -> str:

@@ -163,8 +163,8 @@ def joy(
             ended = f"{problem.strerror or problem}: the gamepad or terminal is gone"
         was_engaged = drive.engaged
         drive.let_go()
-    if was_engaged and (stopped := stop(socket=socket)):
-        return stopped
+    if was_engaged and (stopped := stop(socket=socket)).print(as_json=False):
+        return stopped.status
     if ended:
         raise CommandError(ended)
     return status

@@ -1,13 +1,12 @@
-"""Prints the mode that the robot is in after an operator's command, for people or for programs."""
+"""The mode that the robot is in after an operator's command, as the command's answer."""
 
-from command_line.json_output import print_json
+from command_line import exit_codes
+from command_line.json_output import Answer
 from command_line.screen import complain
 
 
-def print_mode(command: str, as_json: bool, mode: str, notice: str = "", reached: bool = True) -> None:
-    """Print the mode and the daemon's notice. `reached`: the command succeeded; else its error follows as JSON."""
-    if not as_json:
-        print(mode)
-    elif reached:
-        print_json("operation", {"command": command, "mode": mode, "notice": notice})
+def mode_answer(command: str, mode: str, notice: str = "", status: int = exit_codes.OK) -> Answer:
+    """Print the daemon's notice, and return the mode; programs read the error of a command that failed."""
     complain(*filter(None, [notice]))
+    report = {"command": command, "mode": mode, "notice": notice}
+    return Answer(report if status == exit_codes.OK else None, mode, status, "operation")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeAlias
 from command_line import exit_codes
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import Answer
-from command_line.operation.mode_output import print_mode
+from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import (
     MILD,
     MODE_STYLES,
@@ -65,13 +65,12 @@ def status(*, socket: Socket) -> Answer:
 def arm(
     *,
     socket: Socket,
-    json: Json = False,
     force: Annotated[str, Option("overrule this check, such as uncalibrated (or A,B)", metavar="CHECK")] = "",
     wait: Annotated[bool, Option("wait up to 30 s for what ends by itself, such as a joint that moves")] = False,
     take_over: TakeOver = False,
-) -> int:
+) -> Answer:
     params = {"force": force, "take_over": take_over}
-    return _change_mode("arm", "hold", socket, json, params, WAITING_S if wait else 0.0)
+    return _change_mode("arm", "hold", socket, params, WAITING_S if wait else 0.0)
 
 
 def walk(
@@ -102,7 +101,7 @@ def walk(
     note: Annotated[str, Option("what to know about this walk", metavar="TEXT")] = "",
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
-) -> int:
+) -> Answer:
     """Walk at `depth`, or adapt to the mud without one; `adaptive` is there to be typed.
 
     Depths in turn, such as `--depth 2 --depth 3.5 --depth 5`, measure how the coefficients change with depth.
@@ -121,7 +120,7 @@ def walk(
 
         with connect(socket) as client:
             return attend(client, json, params)
-    return _change_mode("walk", "walking", socket, json, params)
+    return _change_mode("walk", "walking", socket, params)
 
 
 def joint_angle(text: str) -> tuple[str, float]:
@@ -145,9 +144,8 @@ def move(
     ],
     *,
     socket: Socket,
-    json: Json = False,
     take_over: TakeOver = False,
-) -> int:
+) -> Answer:
     """Wait until the joints have arrived; Ctrl-C stops them."""
     joints = [joint for joint, _ in angles]
     if twice := next((joint for joint in joints if joints.count(joint) > 1), None):
@@ -162,18 +160,16 @@ def move(
             client.call("stop")
             raise
     arrived = report["mode"] == "hold" and not report["notice"]
-    print_mode("move", json, report["mode"], reached=arrived)
     if not arrived:
-        raise _refusal(report["notice"] or f"the robot is in {report['mode']}")
-    return exit_codes.OK
+        complain(report["notice"] or f"the robot is in {report['mode']}")
+    return mode_answer("move", report["mode"], status=exit_codes.OK if arrived else exit_codes.REFUSED)
 
 
 def clear(
     *,
     socket: Socket,
-    json: Json = False,
     zero: Annotated[bool, Option("also confirm the angles of joints whose zero may have shifted")] = False,
-) -> int:
+) -> Answer:
     with connect(socket) as client:
         client.call("clear", **({"zero": True} if zero else {}))
         report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
@@ -182,8 +178,7 @@ def clear(
         raise _refusal(
             f"the cause is still there: {' '.join(messages) or report['mode']}{_reset_advice(socket, report)}"
         )
-    print_mode("clear", json, report["mode"])
-    return exit_codes.OK
+    return mode_answer("clear", report["mode"])
 
 
 def _reset_advice(socket: Path, report: Report) -> str:
@@ -209,9 +204,7 @@ def stopping_faults(report: Report) -> list[Report]:
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
-def _change_mode(
-    command: str, mode: str, socket: Path, as_json: bool, params: dict[str, Any], waiting_s: float = 0.0
-) -> int:
+def _change_mode(command: str, mode: str, socket: Path, params: dict[str, Any], waiting_s: float = 0.0) -> Answer:
     """Send the command, again for so long as it is refused, and wait for the mode that it asks for."""
     with connect(socket) as client:
         _call_patiently(client, command, params, waiting_s)
@@ -220,8 +213,7 @@ def _change_mode(
         raise _refusal(report["fault"]["message"] if report["fault"] else report["notice"])
     if report["mode"] != mode:
         raise CommandError(f"still {report['mode']} after {ARMING_S:g} s", status=exit_codes.TIMED_OUT)
-    print_mode(command, as_json, mode, report["notice"])
-    return exit_codes.OK
+    return mode_answer(command, mode, report["notice"])
 
 
 def _call_patiently(client: StatusClient, command: str, params: dict[str, Any], waiting_s: float) -> None:

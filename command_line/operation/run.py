@@ -16,6 +16,7 @@ from traceback import extract_tb
 from typing import Annotated, Any
 
 from command_line.errors import usage_error
+from command_line.json_output import Answer
 from command_line.operation.attended_walk import LawError, attend
 from command_line.operation.operation import TakeOver, connect
 from command_line.shared_options import Json, Socket
@@ -33,7 +34,7 @@ def run(
     depth: Annotated[float, Option("of the first stride", unit="cm", low=0.5, high=20.0)] = 2.0,
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
     take_over: TakeOver = False,
-) -> int:
+) -> Answer:
     """Walk by a control law of your own; the robot stops with this command, and with a law that fails or is late."""
     chosen = load_law(law)
     with connect(socket) as client:

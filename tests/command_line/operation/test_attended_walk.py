@@ -61,7 +61,7 @@ def test_a_walk_that_a_fault_ended_is_refused_with_its_cause(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    assert attended_walk.attend(FakeClient(next_of(*reports)), False, {}) == status
+    assert attended_walk.attend(FakeClient(next_of(*reports)), False, {}).print(as_json=False) == status
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == reports[-1]["mode"]
     assert printed.err == (f"mudskipper: {complaint}\n" if complaint else "")
@@ -71,11 +71,13 @@ def test_programs_read_one_object_at_the_end_of_an_attended_walk(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    assert attended_walk.attend(FakeClient(next_of(report("walking"), report("hold"))), True, {}) == exit_codes.OK
+    done = attended_walk.attend(FakeClient(next_of(report("walking"), report("hold"))), True, {})
+    assert done.print(as_json=True) == exit_codes.OK
     assert json.loads(capsys.readouterr().out) == {
         "schema": "operation/1", "command": "walk", "mode": "hold", "notice": "",
     }  # fmt: skip
-    assert attended_walk.attend(FakeClient(next_of(report("fault", "It is silent."))), True, {}) == exit_codes.REFUSED
+    ended = attended_walk.attend(FakeClient(next_of(report("fault", "It is silent."))), True, {})
+    assert ended.print(as_json=True) == exit_codes.REFUSED
     assert capsys.readouterr().out == ""
 
 

@@ -72,7 +72,7 @@ def law(folder: Path, body: str) -> str:
 def test_a_law_is_called_once_for_each_stride_that_closed(
     daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
 ) -> None:
-    assert run.run(law(tmp_path, body), socket=tmp_path) == exit_codes.OK
+    assert run.run(law(tmp_path, body), socket=tmp_path).print(as_json=False) == exit_codes.OK
     assert daemon.orders == list(orders)
 
 
@@ -87,7 +87,7 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
 def test_a_law_that_fails_stops_the_robot_and_is_named(
     daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str], body: str, named: Sequence[str]
 ) -> None:
-    assert run.run(law(tmp_path, body), socket=tmp_path) == exit_codes.REFUSED
+    assert run.run(law(tmp_path, body), socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == "hold" and all(name in printed.err for name in named)
 
@@ -96,7 +96,7 @@ def test_an_order_that_the_daemon_refuses_stops_the_robot(
     daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     daemon._refusal = "depth_m = 9: too deep"
-    assert run.run(law(tmp_path, "return 9.0"), socket=tmp_path) == exit_codes.REFUSED
+    assert run.run(law(tmp_path, "return 9.0"), socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
     assert daemon._refusal in capsys.readouterr().err
 
 
