@@ -87,14 +87,12 @@ def ask_to_clear_faults(robot: BenchRobot, operator: Operator) -> None:
 
     Raises EndedError where the operator leaves a fault, BenchError where it comes back.
     """
+    answers = {CLEAR: "clear it and go on", LEAVE: "stop here"}
     for _ in range(MOST_CLEARS):
         if not (faults := _describe_faults(_status_at_rest(robot))):
             return
         question = f"{faults}\nTorque stays off until this is cleared."
-        if (
-            operator.ask(question, {CLEAR: "clear it and go on", LEAVE: "stop here"}, lambda: robot.wait(POLL_S))
-            != CLEAR
-        ):
+        if operator.ask(question, answers, lambda: robot.wait(POLL_S)) != CLEAR:
             raise EndedError("the fault remains; remove its cause, then 'mudskipper clear' and the same command again")
         robot.call("clear")
     if faults := _describe_faults(_status_at_rest(robot)):
@@ -115,15 +113,14 @@ def _describe_faults(status: Status) -> str:
     """Describe the faults of a robot whose torque is off; empty where none keeps it off."""
     if status["mode"] not in ("idle", "fault"):
         return ""
-    faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
-    if status["mode"] == "fault" and not faults:
-        faults = [status["fault"]] if status["fault"] else []
-    ages_s = [fault["age_s"] for fault in faults]
-    ages = [f"{age_s:.0f} s" if age_s < 100.0 else f"{age_s / 60.0:.0f} min" for age_s in ages_s]
-    lines = [
-        f"  {fault['message']} (for {age})\n    -> {fault['what_to_do']}"
-        for fault, age in zip(faults, ages, strict=True)
-    ]
+    faults = _blocking(status)
+    if status["mode"] == "fault" and not faults and status["fault"]:
+        faults = [status["fault"]]
+    lines = []
+    for fault in faults:
+        age_s = fault["age_s"]
+        age = f"{age_s:.0f} s" if age_s < 100.0 else f"{age_s / 60.0:.0f} min"
+        lines.append(f"  {fault['message']} (for {age})\n    -> {fault['what_to_do']}")
     if status["mode"] == "fault":
         return "\n".join(["The robot is in FAULT:", *(lines or [f"  {status['notice']}"])])
     return "\n".join(["A fault keeps the torque off:", *lines]) if lines else ""
@@ -152,22 +149,23 @@ def _ask_for_torque(robot: BenchRobot) -> None:
     Raises BenchError, CallRefusedError.
     """
     for _ in range(MOST_ARMING_REQUESTS):
-        wait_until(robot, lambda now: now["mode"] == "idle" and not _blocked(now), ARMING_S, "being ready to arm")
+        wait_until(robot, lambda now: now["mode"] == "idle" and not _blocking(now), ARMING_S, "being ready to arm")
         robot.call("arm")
         robot.wait(POLL_S)  # longer than a tick: an idle robot then has lost the request
         status = wait_until(robot, lambda now: now["mode"] != "arming", ARMING_S, "arming")
-        if status["mode"] != "idle" or not _blocked(status):
+        if status["mode"] != "idle" or not _blocking(status):
             break
     if status["mode"] != "hold":
         raise BenchError(mode_reason(status))
 
 
-def _blocked(status: Status) -> bool:
-    return any(fault["blocks_arming"] for fault in status["faults"])
+def _blocking(status: Status) -> list[dict[str, Any]]:
+    """Return the faults that keep the torque off."""
+    return [fault for fault in status["faults"] if fault["blocks_arming"]]
 
 
 def _why_not_armed(robot: BenchRobot, problem: str) -> str:
-    blocking = [fault for fault in robot.call("status")["faults"] if fault["blocks_arming"]]
+    blocking = _blocking(robot.call("status"))
     faults = [f"{fault['message'].rstrip('.')} ({fault['what_to_do']})" for fault in blocking]
     return f"the robot is not armed: {'; '.join(faults) or problem}. See 'mudskipper check'"
 

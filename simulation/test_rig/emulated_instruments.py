@@ -19,7 +19,7 @@ LARGEST_COUNT = 2**23
 @dataclass(frozen=True)
 class AmplifierParameters(TalkerParameters):
     rate_hz: float = 80.0  # of an HX711 with its rate pin high; 10 with it low
-    style: str = "counts"  # or newtons, indicator, columns
+    style: str = "counts"  # or indicator, columns
     counts_per_newton: float = 42000.0  # a cell of 20 N, 2 mV/V, and gain 128
     zero_counts: float = 81000.0
     noise_n: float = 0.008  # of the mounted cell: the stage shakes more than the chip
@@ -55,15 +55,15 @@ class EmulatedAmplifier(SerialTalker):
     def _line(self, force_n: float, at_s: float) -> bytes:
         amplifier = self.amplifier
         overloaded = abs(force_n) > amplifier.range_n
-        style, shown_n = amplifier.style, max(min(force_n, 1e6), -1e6)
-        if style == "indicator":
-            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{shown_n / 9.80665:+09.5f}kg\r\n".encode()
-        if style == "newtons":
-            return b"OL\r\n" if overloaded else f"Load: {shown_n:.4f} N\r\n".encode()
-        end = LARGEST_COUNT - 1 if force_n * amplifier.counts_per_newton > 0.0 else -LARGEST_COUNT
+        if amplifier.style == "indicator":
+            return b"OL,GS,+-------kg\r\n" if overloaded else f"ST,GS,{force_n / 9.80665:+09.5f}kg\r\n".encode()
         counts = round(amplifier.zero_counts + amplifier.counts_per_newton * force_n)
-        counts = end if overloaded else max(-LARGEST_COUNT, min(counts, LARGEST_COUNT - 1))
-        return f"{round(1000 * at_s)},{counts}\r\n".encode() if style == "columns" else f"{counts}\r\n".encode()
+        if overloaded:
+            counts = LARGEST_COUNT if force_n * amplifier.counts_per_newton > 0.0 else -LARGEST_COUNT
+        counts = max(-LARGEST_COUNT, min(counts, LARGEST_COUNT - 1))
+        return (
+            f"{round(1000 * at_s)},{counts}\r\n".encode() if amplifier.style == "columns" else f"{counts}\r\n".encode()
+        )
 
 
 @dataclass(frozen=True)
