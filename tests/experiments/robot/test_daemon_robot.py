@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -126,7 +127,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
             refused = run_in_another_terminal(first, bench, *command)
             assert refused.returncode == exit_codes.REFUSED and "operates the robot" in refused.stderr
-        assert "the lease is held by uid" in run_in_another_terminal(first, bench, "status").stdout
+        assert json.loads(run_in_another_terminal(first, bench, "status", "--json").stdout)["lease"]
         move(first, {"right_sweep": 0.05})
         disarm(first)
         assert "operates the robot" in run_in_another_terminal(first, bench, "arm").stderr
