@@ -54,9 +54,9 @@ def draw_robot(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) ->
 
 def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
     """Draw the body around its shoulder, with an eye in front."""
-    inner_m = np.array([BODY_LENGTH_M, BODY_HEIGHT_M]) - 2.0 * CORNER_M  # between the centres of the corners
-    left_m, low_m = np.array([x_m, z_m]) - inner_m / 2.0
+    width_m, height_m = BODY_LENGTH_M - 2.0 * CORNER_M, BODY_HEIGHT_M - 2.0 * CORNER_M  # between corners' centres
+    corner = (x_m - width_m / 2.0, z_m - height_m / 2.0)
     look: dict[str, Any] = {"facecolor": BODY, "edgecolor": FAINT, "linewidth": 1.2}
-    panel.add_patch(FancyBboxPatch((left_m, low_m), *inner_m, boxstyle=f"round,pad={CORNER_M}", **look))
-    eye = (x_m + inner_m[0] / 2.0, z_m + inner_m[1] / 2.0 + 0.25 * CORNER_M)
+    panel.add_patch(FancyBboxPatch(corner, width_m, height_m, boxstyle=f"round,pad={CORNER_M}", **look))
+    eye = (x_m + width_m / 2.0, z_m + height_m / 2.0 + 0.25 * CORNER_M)
     panel.add_patch(Circle(eye, EYE_M, color=INK))
