@@ -11,8 +11,7 @@ from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguratio
 from command_line.screen import complain, watched
 from command_line.shared_options import DEFAULT_CONFIG
 from experiments.reports.counted_nouns import counted
-from experiments.reports.shown_values import value_shown
-from experiments.reports.text_tables import table
+from experiments.reports.text_tables import table, value_shown
 from experiments.study.option import Option
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import LogError

@@ -16,9 +16,8 @@ from command_line.logs.refusals import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
-from experiments.reports.shown_values import value_shown
 from experiments.reports.style import save_picture
-from experiments.reports.text_tables import table
+from experiments.reports.text_tables import table, value_shown
 from experiments.study.option import Option
 from experiments.study.values import picture
 from firmware_host.configuration.configuration import CaptureAxis

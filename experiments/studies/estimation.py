@@ -7,7 +7,7 @@ samples.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain, product
 from typing import Annotated, Any, Literal
@@ -39,7 +39,7 @@ from experiments.trials.trial import (
 )
 from firmware_host.operator.reports import stride_report
 from simulation.mud.clay import Clay, clay_of_water
-from simulation.mud.disturbances import LAB, NONE, Disturbances
+from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track
 
 SCHEMA = 2
@@ -122,7 +122,8 @@ def study(
     evaluated = compared_frame(chain.from_iterable(measured["evaluated"]))
     errors, plates = error_rows(evaluated), plate_rows(evaluated)
     boundaries = transition_rows(DataFrame(list(chain.from_iterable(measured["transitions"]))))
-    settings = settings_of(muds, seeds, layers)
+    strengths_pa = {name: {clay.name: round(clay.strength_pa, 1) for clay in own} for name, own in muds.items()}
+    settings = {"seeds": seeds} | {f"{name}_strength_pa": own for name, own in strengths_pa.items()} | world_of(layers)
     summary = {"errors": errors, "plates": plates, "boundaries": boundaries, "settings": settings}
     return Result(
         tables=[
@@ -134,20 +135,6 @@ def study(
         summary=summary,
         notes=[] if boundaries else ["Mud boundaries: no walk over any"],
     )
-
-
-def settings_of(muds: Mapping[str, Sequence[Clay]], seeds: int, layers: Sequence[str]) -> dict[str, Any]:
-    """Return what the summary says of the simulated trials."""
-    return {
-        "seeds": seeds,
-        **{
-            f"{name}_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in own} for name, own in muds.items()
-        },
-        "disturbances": asdict(disturbances_of(layers)),
-        "repeats": REPEATS in layers,
-        "torque_error": TORQUE_ERROR if TORQUE in layers else 0.0,
-        "latency_s": LATENCY_S if LATENCY in layers else 0.0,  # the largest of a trial
-    }
 
 
 def parts_of(muds: Mapping[str, Sequence[Clay]], seeds: int, layers: Sequence[str]) -> list[Row]:
@@ -165,9 +152,15 @@ def parts_of(muds: Mapping[str, Sequence[Clay]], seeds: int, layers: Sequence[st
     ]
 
 
-def disturbances_of(layers: Sequence[str]) -> Disturbances:
+def world_of(layers: Sequence[str]) -> dict[str, Any]:
     """Return the laboratory's disturbances of these names, without all others."""
-    return replace(NONE, **{field: getattr(LAB, field) for layer, field in FIELD_OF_LAYER.items() if layer in layers})
+    known = {field: getattr(LAB, field) for layer, field in FIELD_OF_LAYER.items() if layer in layers}
+    return {
+        "disturbances": replace(NONE, **known),
+        "repeats": REPEATS in layers,  # rows come more often than new samples
+        "torque_error": TORQUE_ERROR if TORQUE in layers else 0.0,  # of torque constants
+        "latency_s": LATENCY_S if LATENCY in layers else 0.0,  # of currents or angles, the largest of a trial
+    }
 
 
 def methods_of(setup: Setup) -> Iterator[tuple[dict[str, str], bool, EstimationParameters]]:
@@ -185,20 +178,15 @@ def methods_of(setup: Setup) -> Iterator[tuple[dict[str, str], bool, EstimationP
 def run_part(
     setup: str, muds: Sequence[Sequence[Any]], strides: int, seed: int, layers: Sequence[str]
 ) -> dict[str, list[Row]]:
-    """Simulate one trial and evaluate every method on it, or its transitions between muds.
-
-    With the layer `repeats` rows come more often than new samples, with `torque` torque constants have errors, and with
-    `latency` currents or angles are late.
-    """
-    clays, disturbances = [Clay(*each) for each in muds], disturbances_of(layers)
+    """Simulate one trial and evaluate every method on it, or its transitions between muds."""
+    clays, world = [Clay(*each) for each in muds], world_of(layers)
     track = Track([(ENDLESS_M if len(clays) == 1 else COMPARTMENT_M, clay) for clay in clays])
-    own = SETUPS[setup] if REPEATS in layers else replace(SETUPS[setup], row_period_s=0.0)
-    torque_error = TORQUE_ERROR if TORQUE in layers else 0.0
-    trial = run_trial(own, track, disturbances, strides, seed, torque_error, LATENCY_S if LATENCY in layers else 0.0)
+    own = SETUPS[setup] if world["repeats"] else replace(SETUPS[setup], row_period_s=0.0)
+    trial = run_trial(own, track, world["disturbances"], strides, seed, world["torque_error"], world["latency_s"])
     leaning, upright = (
         {
             (truth.flipper, truth.index): true_coefficients(
-                truth, trial.configuration.geometry, disturbances.relaxation, own.gait.pause_s, is_upright
+                truth, trial.configuration.geometry, world["disturbances"].relaxation, own.gait.pause_s, is_upright
             )
             for truth in trial.truths
         }

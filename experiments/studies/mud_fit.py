@@ -85,31 +85,25 @@ def _chi2(speeds: DataFrame) -> DataFrame:
     return speeds
 
 
+def chi2_of_damping(speeds: DataFrame) -> dict[float, float]:
+    """Return the least chi² of the three muds by damping, each mud at its own best strength."""
+    least = speeds.groupby(level=0)[[*MUDS]].min()
+    return {damping: fsum(own) for damping, *own in least.itertuples()}
+
+
 def best_fit(speeds: DataFrame) -> Fit:
-    """Return the damping with the least chi² of the three muds, each at its own best strength."""
-    fits = [fit_with_damping(damping, own) for damping, own in speeds.groupby(level=0)]
-    return min(fits, key=lambda fit: float(fit["chi2"]))
-
-
-def fit_with_damping(damping_n_s_m: float, speeds: DataFrame) -> Fit:
-    best = {mud: speeds[mud].idxmin() for mud in MUDS}
-    return {
-        "rail_damping_n_s_m": damping_n_s_m,
-        "strength_pa": {mud: ground[1] for mud, ground in best.items()},
-        "chi2": fsum(speeds.loc[ground, mud] for mud, ground in best.items()),
-    }
+    chi2 = chi2_of_damping(speeds)
+    damping = min(chi2, key=lambda each: chi2[each])
+    strengths_pa = {mud: float(speeds.loc[damping][mud].idxmin()) for mud in MUDS}
+    return {"rail_damping_n_s_m": damping, "strength_pa": strengths_pa}
 
 
 def result_of(speeds: DataFrame, present: Fit, seeds: int) -> Result:
     """Report the best fit next to the values in the repository. `speeds` has the chi² of each mud too."""
-    fitted = best_fit(speeds)
+    fitted, present = _evaluated(best_fit(speeds), speeds), _evaluated(present, speeds)
     of_best = speeds.loc[fitted["rail_damping_n_s_m"]]
-    ranges_pa = {mud: _strength_range_pa(of_best[mud]) for mud in MUDS}
-    fitted = _evaluated(fitted, speeds) | {"strength_range_pa": ranges_pa}
-    present = _evaluated(present, speeds)
-    chi2 = {
-        f"{damping:g}": round(fit_with_damping(damping, own)["chi2"], 3) for damping, own in speeds.groupby(level=0)
-    }
+    fitted["strength_range_pa"] = {mud: _strength_range_pa(of_best[mud]) for mud in MUDS}
+    chi2 = {f"{damping:g}": round(each, 3) for damping, each in chi2_of_damping(speeds).items()}
     settings = {"seeds": seeds, "strides": CONSTANT_STRIDES, "walked": len(speeds)}
     summary = {"fitted": fitted, "present": present, "chi2_of_damping": chi2, "settings": settings}
     return Result(_tables(fitted, present, chi2), summary=summary)

@@ -9,8 +9,8 @@ from typing import Any
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
-from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table as aligned
+from experiments.reports.text_tables import value_shown
 from experiments.study.results_folder import USUAL, ResultFiles
 from experiments.study.session import Ending
 

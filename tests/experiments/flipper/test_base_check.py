@@ -6,7 +6,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.flipper.base_check import INVALID_M, load_remarks, pose_remarks, surface_remarks
+from experiments.flipper.measurement import INVALID_M, load_remarks, pose_remarks, surface_remarks
 from logs.files.log_reader import Log
 from tests.experiments.synthetic_strides import (
     CONFIGURATION,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from pandas import DataFrame
@@ -94,20 +96,14 @@ def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> N
     [(REPEATS, 0.005, 0.0, 0.0), (TORQUE, 0.0, 0.032, 0.0), (LATENCY, 0.0, 0.0, LATENCY_S)],
 )
 def test_rows_torque_constants_and_times_are_disturbed_as_asked(
-    layer: str, period_s: float, error: float, latency_s: float, monkeypatch: pytest.MonkeyPatch
+    layer: str, period_s: float, error: float, latency_s: float
 ) -> None:
-    asked: list[Any] = []
-
-    def run_trial(*arguments: Any) -> Any:
-        asked.extend(arguments)
-        raise InterruptedError
-
-    monkeypatch.setattr(estimation, "run_trial", run_trial)
-    with pytest.raises(InterruptedError):
+    interrupted = patch.object(estimation, "run_trial", side_effect=InterruptedError)
+    with interrupted as run_trial, pytest.raises(InterruptedError):
         run_part("walking", MUDS, 1, 1, (layer,))
-    setup, _, disturbances, *_, torque_error, latency = asked
-    assert (setup.row_period_s, torque_error, latency) == (period_s, error, latency_s)
-    assert setup.gait == WALKING.gait and disturbances == NONE
+    setup, _, disturbances, *_, torque_error, latency = run_trial.call_args.args
+    assert (setup, torque_error, latency) == (replace(WALKING, row_period_s=period_s), error, latency_s)
+    assert disturbances == NONE
 
 
 # in simulation

@@ -67,21 +67,19 @@ def test_the_report_has_fit_present_values_and_the_six_cells(summary: dict[str, 
     fitted, present = summary["fitted"], summary["present"]
     assert present["strength_pa"] == {name: clay.strength_pa for name, clay in MUDS.items()}
     assert present["rail_damping_n_s_m"] == PlantParameters().rail_damping_n_s_m
-    assert fitted["chi2"] <= present["chi2"]
-    assert {rule: list(row) for rule, row in fitted["cells"].items()} == {"3 cm": list(MUDS), "5 cm": list(MUDS)}
-    assert min(summary["chi2_of_damping"].values()) == fitted["chi2"]
+    assert min(summary["chi2_of_damping"].values()) == fitted["chi2"] <= present["chi2"]
+    assert {rule: list(row) for rule, row in fitted["cells"].items()} == dict.fromkeys(("3 cm", "5 cm"), list(MUDS))
 
 
 def test_the_grid_reaches_over_all_strengths_in_steps_of_12_percent(
     summary: dict[str, Any], trials: SyntheticTrials
 ) -> None:
-    dampings = {row["rail_damping_n_s_m"] for row in trials.rows}
-    assert {4.0, 5.0, 6.0, 7.0, 8.0} < dampings
-    own = sorted({row["strength_pa"] for row in trials.rows if row["rail_damping_n_s_m"] == 4.0})
+    grid = {(row["rail_damping_n_s_m"], row["strength_pa"]) for row in trials.rows}
+    assert {4.0, 5.0, 6.0, 7.0, 8.0} < {damping for damping, _ in grid}
+    own = sorted(strength_pa for damping, strength_pa in grid if damping == 4.0)
     assert own[0] == 400.0 and 5000.0 / 1.12 < own[-1] <= 5000.0
-    ratios = [after / before for before, after in pairwise(own)]
-    assert ratios == pytest.approx([1.12] * len(ratios), rel=0.002)  # rounded to whole pascals
-    assert summary["settings"]["walked"] == len({tuple(row.values())[:2] for row in trials.rows})
+    assert [after / before for before, after in pairwise(own)] == pytest.approx([1.12] * (len(own) - 1), rel=0.002)
+    assert summary["settings"]["walked"] == len(grid)
 
 
 def test_more_damping_is_slower() -> None:

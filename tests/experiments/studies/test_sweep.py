@@ -39,31 +39,30 @@ def test_the_default_muds_range_from_soup_to_firm_clay_and_every_method_walks_th
 
 def test_each_constant_depth_has_its_speed_and_failures() -> None:
     (mud,) = swept().summary["strengths"]
-    shallow, deep = mud["constant"][0], mud["constant"][-1]
     assert len(mud["constant"]) == len(DEPTHS_M) == 15
-    assert (shallow["depth_cm"], shallow["mean"], shallow["failures"]) == (1.5, 2.0, {"slippage": 2})
-    assert (deep["depth_cm"], deep["mean"], deep["failures"]) == (5.0, 6.0, {})
+    found = [[mud["constant"][i][name] for name in ("depth_cm", "mean", "failures")] for i in (0, -1)]
+    assert found == [[1.5, 2.0, {"slippage": 2}], [5.0, 6.0, {}]]
     assert mud["best"] == {"depth_cm": 3.0, "mean": 6.0}
 
 
-def test_a_method_is_evaluated_from_its_third_stride_on() -> None:
-    settled = swept().summary["strengths"][0]["methods"]["default"]
-    assert (settled["depth_cm"], settled["depth_range_cm"]) == (5.0, [4.5, 5.0])
-    assert settled["mean"] == pytest.approx(5.0)
-    assert settled["fraction_of_best"] == pytest.approx(5.0 / 6.0, abs=0.001)  # rounded
-    assert (settled["strides"], settled["failures"]) == (3, {"extraction": 1})
-
-
-def test_a_mud_in_which_nothing_moves_gives_no_fraction_of_the_best() -> None:
-    (mud,) = swept(lambda **row: Walk([stride(0.02, 0.0)] * 3, "").entry).summary["strengths"]
-    assert mud["best"]["mean"] == 0.0 and mud["methods"]["default"]["fraction_of_best"] is None
-
-
-def test_a_walk_that_a_fault_ended_early_has_no_depth_and_reports_the_fault() -> None:
-    result = swept(lambda **row: Walk([stride(0.02, 0.1)], "a drive is silent").entry)
-    settled = result.json()["strengths"][0]["methods"]["default"]
-    assert (settled["depth_cm"], settled["mean"], settled["faults"]) == (None, 0.0, ["a drive is silent"])
-    assert "- cm" in result.text() and "fault" in result.text()
+@pytest.mark.parametrize(
+    ("measure", "settled"),
+    [
+        # evaluated from its third stride on
+        (walked, {"depth_cm": 5.0, "depth_range_cm": [4.5, 5.0], "mean": 5.0, "fraction_of_best": 0.833, "strides": 3,
+                  "failures": {"extraction": 1}, "faults": []}),
+        # in a mud in which nothing moves
+        (lambda **row: Walk([stride(0.02, 0.0)] * 3, "").entry, {"mean": 0.0, "fraction_of_best": None}),
+        # in a walk that a fault ended early
+        (lambda **row: Walk([stride(0.02, 0.1)], "a drive is silent").entry,
+         {"depth_cm": None, "mean": 0.0, "faults": ["a drive is silent"]}),
+    ],
+)  # fmt: skip
+def test_a_method_has_the_depth_speed_and_failures_at_which_it_settles(measure: Any, settled: dict[str, Any]) -> None:
+    result = swept(measure)
+    found = result.json()["strengths"][0]["methods"]["default"]
+    assert found | settled == found
+    assert ("- cm" in result.text()) == (found["depth_cm"] is None)
 
 
 @pytest.mark.parametrize("strength", [(300.0, 680.0, 6000.0), (680.0,)])
