@@ -68,7 +68,6 @@ LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
 COLOURS = {DEFAULT: "tab:blue", PAPER: "tab:red", COMPENSATED: "tab:orange"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
-Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # by head: the key in a row, and how its value is shown
 
 
 def parse_layers(text: str) -> tuple[str, ...]:
@@ -127,9 +126,9 @@ def study(
     summary = {"errors": errors, "plates": plates, "boundaries": boundaries, "settings": settings}
     return Result(
         tables=[
-            _table("errors", "", errors, ERROR_COLUMNS),
-            _table("plates", "The paper's upright plate (section II-E)", plates, PLATE_COLUMNS),
-            *[_table("boundaries", "Mud boundaries", boundaries, BOUNDARY_COLUMNS)] * bool(boundaries),
+            _table("errors", "", errors),
+            _table("plates", "The paper's upright plate (section II-E)", plates),
+            *[_table("boundaries", "Mud boundaries", boundaries)] * bool(boundaries),
         ],
         figures=[Figure("estimation", "", partial(draw_errors, errors))],
         summary=summary,
@@ -207,46 +206,32 @@ def run_part(
 # tables and figure
 
 
-def _table(name: str, title: str, rows: Sequence[Row], columns: Columns) -> Table:
-    return Table(
-        name, title, {}, DataFrame([{head: show(row[key]) for head, (key, show) in columns.items()} for row in rows])
-    )
-
-
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100.0 * value:.1f} %"
 
 
-ERROR_COLUMNS: Columns = {
-    "setup": ("setup", str),
-    "mud": ("mud", mud_text),
-    "": ("coefficient", str),
-    "method": ("method", str),
-    "median": ("median", _percent),
-    "p95": ("p95", _percent),
-    "bias": ("bias", _percent),
-    "in 95 %": ("coverage", _percent),
-    "chi": ("chi", number),
-    "strides": ("strides", str),
-    "bounds": ("bounds", str),
-    "hold": ("bounds_hold", _percent),
-    "not valid": ("not_valid", str),
+SHOWN: dict[str, Callable[[Any], str]] = {  # by key of a row; others as they are
+    **dict.fromkeys(("mud", "from", "to"), mud_text),
+    **dict.fromkeys(("median", "p95", "bias", "coverage", "bounds_hold", "lean_fraction", "within_two"), _percent),
+    **dict.fromkeys(("chi", "upright_over_leaning", "estimate_over_upright"), number),
 }
-PLATE_COLUMNS: Columns = {
-    "setup": ("setup", str),
-    "mud": ("mud", mud_text),
-    "": ("coefficient", str),
-    "upright / leaning plate": ("upright_over_leaning", number),
-    "estimate / upright": ("estimate_over_upright", number),
-    "fraction due to the lean": ("lean_fraction", _percent),
+HEADS = {  # by key; others are their keys
+    "coefficient": "",
+    "coverage": "in 95 %",
+    "bounds_hold": "hold",
+    "not_valid": "not valid",
+    "upright_over_leaning": "upright / leaning plate",
+    "estimate_over_upright": "estimate / upright",
+    "lean_fraction": "fraction due to the lean",
+    "within_two": "followed within two strides",
+    "most_strides": "most strides",
 }
-BOUNDARY_COLUMNS: Columns = {
-    "from": ("from", mud_text),
-    "to": ("to", mud_text),
-    "transitions": ("transitions", str),
-    "followed within two strides": ("within_two", _percent),
-    "most strides": ("most_strides", str),
-}
+NOT_SHOWN = ("bound_over_truth", "truth_n_m3")
+
+
+def _table(name: str, title: str, rows: Sequence[Row]) -> Table:
+    cells = [{key: SHOWN.get(key, str)(value) for key, value in row.items() if key not in NOT_SHOWN} for row in rows]
+    return Table(name, title, {}, DataFrame(cells).rename(columns=HEADS))
 
 
 def draw_errors(errors: Sequence[Row]) -> Drawing:
