@@ -14,12 +14,10 @@ PLAN = {"weights_g": (10, 20), "joint": "right_sweep"}
 def test_what_was_measured_is_there_again(tmp_path: Path) -> None:
     first = Notebook(tmp_path / "new", PLAN)
     assert not first.entries
-    first.write("10 g", {"torque_nm": 0.1})
-    first.write("20 g", {"torque_nm": 0.2})
-    first.write("10 g", {"torque_nm": 0.11})
+    for key, torque_nm in (("10 g", 0.1), ("20 g", 0.2), ("10 g", 0.11)):
+        first.write(key, {"torque_nm": torque_nm})
     first.forget("20 g")
-    again = Notebook(tmp_path / "new", PLAN)
-    assert again.entries and again.entries == first.entries == {"10 g": {"torque_nm": 0.11}}
+    assert Notebook(tmp_path / "new", PLAN).entries == first.entries == {"10 g": {"torque_nm": 0.11}}
 
 
 def test_another_plan_is_refused_with_what_differs(tmp_path: Path) -> None:

@@ -35,15 +35,11 @@ def ignore(done: int, total: int) -> None:
     pass
 
 
-def test_outcomes_come_in_the_order_of_the_trials_not_of_their_ends() -> None:
-    waits = [0.2, 0.0, 0.05, 0.0]
-    assert run_parallel([partial(late, wait) for wait in waits], ignore, TWO) == waits
-
-
-def test_progress_counts_every_trial() -> None:
-    shown = list[tuple[int, int]]()
-    run_parallel([partial(late, 0.0)] * 3, lambda done, total: shown.append((done, total)), ONE)
-    assert shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
+def test_results_come_in_the_order_of_the_trials_not_of_their_ends_and_each_is_counted() -> None:
+    waits, shown = [0.2, 0.0, 0.05, 0.0], list[tuple[int, int]]()
+    trials = [partial(late, wait) for wait in waits]
+    assert run_parallel(trials, lambda done, total: shown.append((done, total)), TWO) == waits
+    assert shown == [(done, 4) for done in range(5)]
 
 
 def test_trials_run_in_other_processes() -> None:
