@@ -124,14 +124,7 @@ def _examine_state(name: str, bus: BusParameters, link: CanLink) -> Finding:
 
 
 def _examine_settings(name: str, bus: BusParameters, link: CanLink) -> Iterator[Finding]:
-    if link.bit_rate_bit_s:
-        right, drives_kbit_s = link.bit_rate_bit_s == 1000 * bus.bit_rate_kbit_s, bus.bit_rate_kbit_s
-        text = f"{link.name} runs at {link.bit_rate_bit_s / 1000:g} kbit/s"
-        text += "" if right else f", its drives at {drives_kbit_s}"
-        fix = f"set BitRate= in {NETWORK_FILE}, or bus.{name}.bit_rate_kbit_s if the drives run at that"
-        yield ok_if(right, f"bit_rate.{name}", text, fix, Level.FAIL)
-    if bus.data_bit_rate_kbit_s:
-        yield from _examine_fd(name, bus, link)
+    yield from _examine_rates(name, bus, link)
     if isfinite(link.sample_point):
         lowest, highest = FD_SAMPLE_POINTS if bus.data_bit_rate_kbit_s else SAMPLE_POINTS
         point = "66.6%" if bus.data_bit_rate_kbit_s else "80%"
@@ -147,18 +140,24 @@ def _examine_settings(name: str, bus: BusParameters, link: CanLink) -> Iterator[
         yield ok_if(QUEUE_FRAMES[0] <= link.queue_frames <= QUEUE_FRAMES[1], f"queue.{name}", text, fix)
 
 
-def _examine_fd(name: str, bus: BusParameters, link: CanLink) -> Iterator[Finding]:
-    fix = f"set FDMode=yes and DataBitRate={bus.data_bit_rate_kbit_s}K in {NETWORK_FILE}, or " + BRING_UP_FD.format(
-        link.name, bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s
-    )
-    if link.carries_fd is not None:
+def _examine_rates(name: str, bus: BusParameters, link: CanLink) -> Iterator[Finding]:
+    """Compare the bit rates of the interface with those of the drives, as far as they are known."""
+    wanted_kbit_s, data_kbit_s = bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s
+    bring_up = BRING_UP_FD.format(link.name, wanted_kbit_s, data_kbit_s)
+    fix = f"set BitRate= in {NETWORK_FILE}, or bus.{name}.bit_rate_kbit_s if the drives run at that"
+    fix_fd = f"set FDMode=yes and DataBitRate={data_kbit_s}K in {NETWORK_FILE}, or {bring_up}"
+    if data_kbit_s and link.carries_fd is not None:
         text = f"{link.name} {'carries' if link.carries_fd else 'does not carry'} CAN FD frames"
-        yield ok_if(link.carries_fd, f"fd.{name}", text, fix, Level.FAIL)
-    if link.data_bit_rate_bit_s:
-        right = link.data_bit_rate_bit_s == 1000 * bus.data_bit_rate_kbit_s
-        text = f"{link.name} sends data at {link.data_bit_rate_bit_s / 1000:g} kbit/s"
-        text += "" if right else f", its drives at {bus.data_bit_rate_kbit_s}"
-        yield ok_if(right, f"data_bit_rate.{name}", text, fix, Level.FAIL)
+        yield ok_if(link.carries_fd, f"fd.{name}", text, fix_fd, Level.FAIL)
+    for line, verb, actual_bit_s, expected_kbit_s, advice in (
+        ("bit_rate", "runs", link.bit_rate_bit_s, wanted_kbit_s, fix),
+        ("data_bit_rate", "sends data", link.data_bit_rate_bit_s, data_kbit_s, fix_fd),
+    ):
+        if actual_bit_s and expected_kbit_s:
+            right = actual_bit_s == 1000 * expected_kbit_s
+            text = f"{link.name} {verb} at {actual_bit_s / 1000:g} kbit/s"
+            text += "" if right else f", its drives at {expected_kbit_s}"
+            yield ok_if(right, f"{line}.{name}", text, advice, Level.FAIL)
 
 
 def _examine_load(name: str, bus: BusParameters, drives: Sequence[DriveParameters], link: CanLink | None) -> Finding:

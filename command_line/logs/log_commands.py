@@ -10,9 +10,8 @@ from typing import Annotated, Literal
 from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.json_output import Answer
-from command_line.logs.lab_findings import chosen_vertical, complain_of
+from command_line.logs.complaints import chosen_vertical, complain_of, complain_of_end
 from command_line.logs.log_options import MOST, LogFiles, Segments, Vertical, Walk
-from command_line.logs.refusals import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides

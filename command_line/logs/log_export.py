@@ -7,8 +7,8 @@ from typing import Annotated
 
 from command_line import exit_codes
 from command_line.errors import usage_error
+from command_line.logs.complaints import complain_of_end
 from command_line.logs.log_options import Segments
-from command_line.logs.refusals import complain_of_end
 from command_line.screen import watched
 from experiments.study.option import Option
 from logs.files.log_error import LogError

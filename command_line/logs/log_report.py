@@ -9,7 +9,7 @@ from typing import Annotated
 
 from command_line import exit_codes
 from command_line.json_output import Answer
-from command_line.logs.lab_findings import chosen_vertical, complain_of
+from command_line.logs.complaints import chosen_vertical, complain_of
 from command_line.logs.log_options import Vertical
 from command_line.screen import watched
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths, layout_of_track

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
+from typing import Any
 
 import pytest
 
@@ -32,6 +34,18 @@ def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProc
     return subprocess.run(
         command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
     )
+
+
+def output(*arguments: str) -> str:
+    """Return what a command prints that succeeds."""
+    ended = run(*arguments)
+    assert ended.returncode == exit_codes.OK, ended.stderr
+    return ended.stdout
+
+
+def json_of(*arguments: str) -> Any:
+    """Return what a command that succeeds prints for programs."""
+    return json.loads(output(*arguments, "--json"), parse_constant=pytest.fail)  # NaN is not valid JSON
 
 
 def refusal(*arguments: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import duckdb
@@ -12,7 +11,7 @@ from command_line import exit_codes
 from command_line.main import main
 from firmware_host.log.log_folder import DONE
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
-from tests.command_line.command_lines import failure
+from tests.command_line.command_lines import failure, json_of, output
 from tests.folders import ROOT
 
 
@@ -24,19 +23,16 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_list_knows_strides_and_reasons(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["log", "list", str(folder), "--json"]) == exit_codes.OK
-    logs = {log["name"]: log for log in json.loads(capsys.readouterr().out)["logs"]}
+def test_the_list_knows_strides_and_reasons(folder: Path) -> None:
+    logs = {log["name"]: log for log in json_of("log", "list", str(folder))["logs"]}
     assert logs["walk.mcap"]["strides"] == 6 and logs["walk.mcap"]["started"] == "2026-11-22T14:50:21+00:00"
     assert logs["text.mcap"]["state"] == "broken" and logs["text.mcap"]["reason"]
 
 
-def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_query_is_answered_as_text_and_as_json(folder: Path) -> None:
     query = "select file, strides, started from logs where state = 'whole'"
-    assert main(["log", "query", query, str(folder)]) == exit_codes.OK
-    assert "done/walk.mcap" in capsys.readouterr().out
-    assert main(["log", "query", query, str(folder), "--json"]) == exit_codes.OK
-    assert json.loads(capsys.readouterr().out)["rows"][0]["strides"] == 6
+    assert "done/walk.mcap" in output("log", "query", query, str(folder))
+    assert json_of("log", "query", query, str(folder))["rows"][0]["strides"] == 6
 
 
 def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

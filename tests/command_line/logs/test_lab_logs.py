@@ -14,7 +14,7 @@ from experiments.lablogs.estimates import EvaluatedLog, read_log
 from firmware_host.configuration.loading import parse_configuration
 from logs.lab.lab_csv import read_lab_csv
 from logs.replay import Replay
-from tests.command_line.command_lines import run
+from tests.command_line.command_lines import json_of, run
 from tests.lab_logs import SETTINGS, lab_columns, write_lab_log
 
 COMMANDS = {
@@ -64,7 +64,7 @@ def test_nonsense_is_refused_by_every_command(command: tuple[str, ...], hung: Pa
 
 
 def test_log_info_describes_a_csv(hung: Path) -> None:
-    info = json.loads(run("log", "info", str(hung), "--json").stdout)
+    info = json_of("log", "info", str(hung))
     log = read_lab_csv(hung)
     assert info["schema"] == "log-info/2" and info["rows"] == len(log.stamp_s)
     assert info["duration_s"] == pytest.approx(log.stamp_s[-1]) and info["rate_hz"] == pytest.approx(200.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 import subprocess
@@ -24,7 +23,7 @@ from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 from logs.files.log_reader import read_log
-from tests.command_line.command_lines import run
+from tests.command_line.command_lines import json_of, run
 from tests.recorded_walks import record_walks
 from tests.waiting import LONGEST_S
 
@@ -38,7 +37,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration)
 
 
 def test_log_info_counts(walk: Path) -> None:
-    reported = json.loads(run("log", "info", str(walk), "--json").stdout)
+    reported = json_of("log", "info", str(walk))
     assert reported["robot"] == "test" and reported["complete"] is True
     assert reported["missed_ticks"] == 0 and reported["strides"] == 4
     assert reported["segment"] is None or isinstance(reported["segment"], int)
@@ -50,7 +49,7 @@ def test_log_info_counts(walk: Path) -> None:
 
 def test_replay_shows_the_depth_that_the_robot_chose(walk: Path) -> None:
     chosen_m = [stride["chosen_depth_m"] for stride in read_log(walk).strides]
-    strides = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    strides = json_of("replay", str(walk))["strides"]
     assert [stride["chosen_depth_m"] for stride in strides] == chosen_m
     for line, depth_m in zip(run("replay", str(walk)).stdout.splitlines()[2:], chosen_m, strict=True):
         assert f" {100.0 * depth_m:.2f} " in line
@@ -61,8 +60,8 @@ def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> Non
     path = tmp_path / "walk.csv"
     assert run("log", "export", str(walk), "--csv", "--out", str(path)).returncode == exit_codes.OK
     assert path.read_text(encoding="utf-8").splitlines()[2].startswith("time,turtle_state,leftadduction_pos")
-    ours = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
-    theirs = json.loads(run("replay", str(path), "--json").stdout)["strides"]
+    ours = json_of("replay", str(walk))["strides"]
+    theirs = json_of("replay", str(path))["strides"]
     assert [stride["index"] for stride in ours] == [stride["index"] for stride in theirs]
     for one, other in zip(ours, theirs, strict=True):
         assert other["k_s"]["value"] == pytest.approx(one["k_s"]["value"], rel=0.1)
@@ -93,7 +92,7 @@ def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, segments
     assert np.array_equal(whole.sweep_angle_rad, joined.sweep_angle_rad)
     assert (repr(joined.strides), joined.cut) == (repr(whole.strides), "")
     assert run("plot", *paths, "--out", str(tmp_path / "walk.png")).stderr == ""
-    reported = json.loads(run("log", "info", *paths, "--json").stdout)
+    reported = json_of("log", "info", *paths)
     assert reported["strides"] == 4
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from tests.command_line.command_lines import run, run_process
+from tests.command_line.command_lines import json_of, run, run_process
 from tests.folders import ROOT
 
 RSYNC = """#!{python}
@@ -55,7 +55,7 @@ def test_finished_logs_are_copied_compared_and_marked_once(robot: Path) -> None:
     assert (ended.returncode, json.loads(ended.stdout)["copied"]) == (exit_codes.OK, ["1.mcap", "2.mcap", "3.mcap"])
     assert {path.name for path in (robot / "copied").iterdir()} == {"1", "2", "3"}
     (robot / "done" / "5.mcap").touch()
-    assert json.loads(run("log", "pull", f"host:{robot}", "here", "--json").stdout)["copied"] == ["5.mcap"]
+    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == ["5.mcap"]
 
 
 def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
