@@ -12,6 +12,7 @@ errors of the strides count. A difference is shown where it exceeds two of its s
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from math import fsum, hypot, isfinite, sqrt
 from typing import Any
 
@@ -37,6 +38,7 @@ Entry = dict[str, Any]  # of the JSON of a report
 Value = tuple[float | None, float | None]  # with its standard error
 SHOWN = 2.0  # standard errors
 SPEED = "speed"
+SPEED_KEYS = ("distance_m", "duration_s", "speed_m_s", "speed_std_error_m_s")
 DOING = {Outcome.GOOD: "good", Outcome.SLIPPING: "slipped", Outcome.STUCK: "stuck"}
 
 
@@ -70,17 +72,12 @@ def travel_of(walks: Sequence[RecordedWalk]) -> Entry:
         if len(known):
             distance_m += float(walk.body_x_m[known[-1]] - walk.body_x_m[known[0]])
             duration_s += float(walk.time_s[known[-1]] - walk.time_s[known[0]])
-    return _speed(distance_m, duration_s) if duration_s > 0.0 else _speed(None)
+    return _speed(distance_m, duration_s, distance_m / duration_s) if duration_s > 0.0 else _speed()
 
 
-def _speed(distance_m: float | None, duration_s: float | None = None, std_error_m_s: float | None = None) -> Entry:
-    """`duration_s` is None where there is no pose; `std_error_m_s` of a single stride."""
-    return {
-        "distance_m": distance_m,
-        "duration_s": duration_s,
-        "speed_m_s": None if distance_m is None or duration_s is None else distance_m / duration_s,
-        "speed_std_error_m_s": std_error_m_s,
-    }
+def _speed(*values: float | None) -> Entry:
+    """Return the values of SPEED_KEYS, of which the last ones may be unknown."""
+    return dict(zip_longest(SPEED_KEYS, values))
 
 
 def _count_outcomes(strides: DataFrame) -> dict[str, int]:
@@ -117,7 +114,7 @@ def speed_of(strides: DataFrame) -> Entry:
         squares = fsum((step_m - speed_m_s * seconds) ** 2 for step_m, seconds in known)
         freedom = len(known) - 1
         error = student_factor(freedom) * sqrt(squares / freedom * len(known)) / duration_s
-    return _speed(distance_m, duration_s, error) | {"speed_m_s": speed_m_s}
+    return _speed(distance_m, duration_s, speed_m_s, error)
 
 
 def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
