@@ -141,12 +141,15 @@ def _ratio(mean: float | None, best: float) -> float | None:
 
 def _best_table(report: Summary) -> Table:
     best, over_best = report["best_constant_depth"], report["over_best"]
-    rows = [{"": "depth"} | {mud_label(mud): f"{each['depth_cm']:g} cm" for mud, each in best.items()}]
-    rows.append({"": "speed"} | {mud_label(mud): f"{each['mean']:.2f} cm/s" for mud, each in best.items()})
+    rows = [
+        {"": "depth"} | {mud: f"{each['depth_cm']:g} cm" for mud, each in best.items()},
+        {"": "speed"} | {mud: f"{each['mean']:.2f} cm/s" for mud, each in best.items()},
+    ]
     rows[1]["all muds"] = f"{report['best_constant_mean_over_muds']:.2f} cm/s"
     for gait in report["settings"]["methods"]:
-        rows.append({"": f"{gait} over best"} | {mud_label(mud): number(over_best[gait][mud]) for mud in best})
-    return Table("best", "Best constant depth in each mud alone", {}, DataFrame(rows).fillna(""), "Table I")
+        rows.append({"": f"{gait} over best"} | {mud: number(ratio) for mud, ratio in over_best[gait].items()})
+    table = DataFrame(rows).rename(columns=mud_label).fillna("")
+    return Table("best", "Best constant depth in each mud alone", {}, table, "Table I")
 
 
 def robot(

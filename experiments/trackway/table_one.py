@@ -123,21 +123,19 @@ def _sd(speeds: Sequence[float]) -> float | None:
 
 def speed_table(report: Summary) -> Table:
     """Return Table I: each gait after the second stride, over all strides, and the paper's."""
-    rows = []
+    rows: list[dict[str, str]] = []
     for gait, row in report["table"].items():
+        over_muds = report["mean_over_muds"][gait]
         for head, mean, sd in ((gait, "mean", "sd"), ("  all strides", "mean_all", "sd_all")):
             cells = {mud: _plus_minus(cell[mean], cell[sd]) for mud, cell in row.items()}
-            rows.append(_speed_row(head, cells, report["mean_over_muds"][gait][mean]))
+            rows.append({"speed": head, **cells, "all muds": number(over_muds[mean], 2)})
         if gait in PAPER_TABLE:
-            over_muds = fmean(speed.mean for speed in PAPER_TABLE[gait].values())
-            rows.append(_speed_row("  paper", {mud: _paper_text(report, gait, mud) for mud in row}, over_muds))
+            cells = {mud: _paper_text(report, gait, mud) for mud in row}
+            of_paper = fmean(speed.mean for speed in PAPER_TABLE[gait].values())
+            rows.append({"speed": "  paper", **cells, "all muds": number(of_paper, 2)})
     trials = counted(report["settings"]["seeds"], "trial")
     title = f"Table I: speed after the second stride in each mud, mean ± sd of {trials}"
-    return Table("table", title, {"speed": "cm/s"}, DataFrame(rows), "Table I")
-
-
-def _speed_row(head: str, cells: Mapping[str, str], mean: float | None) -> dict[str, str]:
-    return {"speed": head} | {mud_label(mud): text for mud, text in cells.items()} | {"all muds": number(mean, 2)}
+    return Table("table", title, {"speed": "cm/s"}, DataFrame(rows).rename(columns=mud_label), "Table I")
 
 
 def _plus_minus(mean: float | None, sd: float | None) -> str:
@@ -155,13 +153,12 @@ def _paper_text(report: Summary, rule: str, mud: str) -> str:
 
 def failure_table(report: Summary) -> Table:
     """Return the failed strides of each gait by mud, and how its walks ended."""
-    rows = [
-        {"": rule}
-        | {mud_label(mud): _failures_of(cell) for mud, cell in row.items()}
-        | {"ends": ", ".join(f"{count} {end}" for end, count in report["ends"][rule].items())}
-        for rule, row in report["table"].items()
-    ]
-    return Table("failures", "Failed strides, in brackets those after the second", {}, DataFrame(rows), "Table I")
+    rows = []
+    for gait, row in report["table"].items():
+        ends = ", ".join(f"{count} {end}" for end, count in report["ends"][gait].items())
+        rows.append({"": gait, **{mud: _failures_of(cell) for mud, cell in row.items()}, "ends": ends})
+    title = "Failed strides, in brackets those after the second"
+    return Table("failures", title, {}, DataFrame(rows).rename(columns=mud_label), "Table I")
 
 
 def _failures_of(cell: Summary) -> str:
