@@ -87,24 +87,16 @@ def test_hold_keeps_the_pose_that_was_measured_when_it_began() -> None:
     assert wanted_pose(controller, Mode.HOLD, Joints(0.0, 0.0, 0.0, 0.0)) == pytest.approx(POSE)
 
 
-def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
+def test_the_torque_after_every_arming_is_a_ramp_from_nothing() -> None:
     controller = heavy(MotionParameters(fade_in_s=0.5))
-    controller.step(PERIOD_S, Mode.ARMING, states_at(POSE))
-    torques = [controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) for _ in range(300)]
-    whole = torques[-1]
-    assert whole[1] > 0.01  # the arm's weight
-    for tick, torque in enumerate(torques, start=1):
-        fraction = min(1.0, tick * PERIOD_S / 0.5)
-        assert torque == pytest.approx([fraction * each for each in whole], abs=1e-12)
-
-
-def test_the_ramp_starts_again_after_every_arming() -> None:
-    controller = heavy(MotionParameters(fade_in_s=0.5))
-    first = controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
-    for _ in range(300):
-        controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
-    controller.step(PERIOD_S, Mode.FAULT, states_at(POSE))
-    assert controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) == first
+    for off in (Mode.ARMING, Mode.FAULT):
+        controller.step(PERIOD_S, off, states_at(POSE))
+        torques = [controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) for _ in range(300)]
+        whole = torques[-1]
+        assert whole[1] > 0.01  # the arm's weight
+        for tick, torque in enumerate(torques, start=1):
+            fraction = min(1.0, tick * PERIOD_S / 0.5)
+            assert torque == pytest.approx([fraction * each for each in whole], abs=1e-12)
 
 
 def test_a_walk_raises_the_flippers_then_sweeps_them_to_the_front_then_starts_the_gait() -> None:
@@ -297,20 +289,12 @@ def test_rested_is_true_after_the_configured_time_and_never_without_one(longest_
         assert controller.rested is (tick >= ticks)
 
 
-def test_the_hold_time_restarts_with_every_hold_and_stops_in_other_modes() -> None:
+def test_the_hold_time_restarts_with_every_hold_and_every_move_and_stops_in_other_modes() -> None:
     controller = heavy(MotionParameters(longest_hold_s=1.0))
     controller.order = WalkOrder(0.03)
-    for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD):
+    for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD, Mode.HOLD):
         for _ in range(370):
             controller.step(PERIOD_S, mode, states_at(RAISED))
-            assert not controller.rested
-
-
-def test_the_hold_time_restarts_with_every_move() -> None:
-    controller = heavy(MotionParameters(longest_hold_s=1.0))
-    for _ in range(4):
-        for _ in range(370):
-            controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
             assert not controller.rested
         controller.move([None, 0.0, None, None])
 

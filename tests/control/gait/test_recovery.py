@@ -17,7 +17,7 @@ from control.controller import Controller, WalkOrder
 from control.faults import FaultKind
 from control.gait.gait import PROTOCOLS, stride_duration_s
 from control.gait.joint_path import still
-from control.gait.recovery import AWAY_FRACTION, Gap, Recovery, is_in_mud, lowest_point_m
+from control.gait.recovery import AWAY_FRACTION, Recovery, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.modes import Mode
@@ -357,19 +357,6 @@ def test_the_swing_after_a_recovery_ends_where_every_swing_ends_and_is_soon_clea
     assert swing
     for moment in swing[round(0.2 / PERIOD_S) :]:
         assert lowest_point_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
-
-
-angles = st.floats(-1.0, 1.0)
-
-
-@given(angles, angles, st.floats(0.05, 2.0), st.floats(0.01, 0.99))
-def test_the_velocity_of_a_gap_is_its_derivative(
-    angle_rad: float, velocity_rad_s: float, duration_s: float, fraction: float
-) -> None:
-    gap, step_s = Gap(angle_rad, velocity_rad_s, duration_s), 1e-5 * duration_s
-    early, late = (gap.after(fraction * duration_s + offset_s) for offset_s in (-step_s, step_s))
-    slope = (late.angle_rad - early.angle_rad) / (2.0 * step_s)
-    assert gap.after(fraction * duration_s).velocity_rad_s == pytest.approx(slope, abs=1e-4)
 
 
 # when a flipper is out

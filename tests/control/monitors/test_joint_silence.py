@@ -73,10 +73,11 @@ def test_the_default_bounds_are_those_that_the_reference_publishes() -> None:
 def test_a_signal_may_be_exactly_as_old_as_its_bound(
     signals: tuple[str, ...], bound_s: float, before: str, after: str
 ) -> None:
-    for now_s, name in ((bound_s, before), (nextafter(bound_s, inf), after)):
-        faults = faults_of(make_monitor(), healthy(now_s, **stamped(signals, 0.0)), now_s)
+    for stamp_s, age_s, name in ((0.0, bound_s, before), (0.0, nextafter(bound_s, inf), after), (3.0, 1.5, "")):
+        faults = faults_of(make_monitor(), healthy(stamp_s + age_s, **stamped(signals, stamp_s)), stamp_s + age_s)
         ages_s = {fault.name: dict(fault.values)["age_s"] for fault in faults}
-        assert ages_s == ({name: now_s} if name else {})
+        assert list(ages_s.values()) == [age_s] * len(ages_s)
+        assert stamp_s or set(ages_s) == {name} - {""}
 
 
 @pytest.mark.parametrize(

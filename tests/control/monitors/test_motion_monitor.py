@@ -229,10 +229,15 @@ def test_a_slow_push_and_its_return_are_no_oscillation_and_neither_is_a_joint_th
 @pytest.mark.parametrize("target_rad_s", [0.0, 4.0])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_following_error_may_grow_with_the_commanded_speed(target_rad_s: float, side: float) -> None:
-    samples, most_rad = Samples(), 0.2 + TORQUE_NM / 8.0 + 0.05 * target_rad_s
-    for error_rad, expected in ((most_rad, set()), (most_rad + 1e-9, {"following_error"})):
-        found = samples.add(target_rad=side * error_rad, target_rad_s=copysign(target_rad_s, side))
-        assert found == expected
+    most_rad = 0.2 + TORQUE_NM / 8.0 + 0.05 * target_rad_s
+    for angle_rad, beyond_rad, expected in (
+        (0.0, 0.0, set()),  # exactly the bound
+        (0.0, 1e-9, {"following_error"}),
+        (0.1, -1e-9, set()),
+        (0.1, 1e-9, {"following_error"}),
+    ):
+        target_rad = angle_rad + side * (most_rad + beyond_rad)
+        assert Samples().add(angle_rad, 0.0, target_rad, target_rad_s=copysign(target_rad_s, side)) == expected
 
 
 def test_next_to_another_fault_each_bound_is_allowed_exactly_too() -> None:
