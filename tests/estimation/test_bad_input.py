@@ -8,20 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.gait.gait import Gait
-from control.geometry import FlipperGeometry
-from control.parameters.arm_mass import ArmMass
-from control.parameters.gait_parameters import GaitParameters
-from control.rate import PERIOD_S
 from control.records import BodyPose, Phase, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters, Method
 from estimation.joint_load import FlipperDrive
 from estimation.mud import MudEstimator
 from estimation.recorded_states import recorded_states
 from estimation.strokes.depth_line import COEFFICIENTS_N_M3
+from tests.estimation.synthetic_strides import GEOMETRY, WEIGHTLESS, walked
 
-GEOMETRY = FlipperGeometry()
-DRIVE = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.083, current_limit_a=10.0)
+DRIVE = FlipperDrive(WEIGHTLESS, 0.083, 0.083, current_limit_a=10.0)
 STRIDES = 4
 METHODS: tuple[Method, ...] = ("default", "paper")
 COEFFICIENT = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
@@ -51,15 +46,12 @@ def fed(mud: MudEstimator, rows: list[Row], body_m: float = 0.0) -> list[StrideE
 @cache
 def walk() -> list[Row]:
     """Return rows whose currents are in proportion to depth and oppose each stroke, up to 9 A."""
-    gait, rows = Gait(GaitParameters(), GEOMETRY), list[Row]()
-    gait.reset(0.03)
-    while gait.stride < STRIDES / 2:
-        target = gait.step(PERIOD_S)
-        adduction = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
-        push = max(0.0, target.depth_m)
-        sweep_a = -300.0 * push if target.phase is Phase.STANCE else 0.0
-        adduction_a = {Phase.INSERTION: -150.0, Phase.EXTRACTION: 150.0}.get(target.phase, 0.0) * push
-        rows.append((len(rows) * PERIOD_S, target.phase, target.sweep_rad, adduction, sweep_a, adduction_a))
+    rows = []
+    for moment in walked(strides=STRIDES // 2):
+        push = max(0.0, moment.depth_m)
+        sweep_a = -300.0 * push if moment.phase is Phase.STANCE else 0.0
+        adduction_a = {Phase.INSERTION: -150.0, Phase.EXTRACTION: 150.0}.get(moment.phase, 0.0) * push
+        rows.append((*moment[:4], sweep_a, adduction_a))
     return rows
 
 
