@@ -175,6 +175,8 @@ def test_over_a_gap_and_at_a_speed_that_no_joint_has_no_energy_is_added(
     samples.add()
     assert samples.add(side * angle_rad, side * velocity_rad_s, dt_s=dt_s, torque_nm=-side * TORQUE_NM) == set()
     assert samples.monitor.unexplained_j == 0.0
+    assert samples.add() == set()
+    assert samples.monitor.unexplained_j == 0.0  # nor is any owed by the next sound sample
 
 
 # path away from the target
