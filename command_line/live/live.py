@@ -51,7 +51,7 @@ def live(
         audience, address = _open_page(host, port, socket, name) if page else _open_viewers(host, port)
     except ModuleNotFoundError:
         raise CommandError(
-            "viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page"
+            "viewers need foxglove-sdk and rosbags: install mudskipper with its extra 'live', or use --page"
         ) from None
     except OSError as problem:
         raise CommandError(f"{host}:{port}: {problem.strerror or problem}") from None
