@@ -23,9 +23,9 @@ LAYERS = [
     ("estimation", "drivers"),
     ("firmware_host",),
     ("operator_client", "logs"),
-    ("simulation", "mudskipper"),
+    ("simulation",),
     ("experiments",),
-    ("verification",),
+    ("verification", "mudskipper"),
     ("command_line",),
 ]
 HEIGHT = {package: height for height, layer in enumerate(LAYERS) for package in layer}

@@ -18,7 +18,7 @@ from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
-NOT_ON_A_ROBOT = {"test", "docs", "cluster"}
+NOT_ON_A_ROBOT = {"test", "docs", "cluster", "gym"}
 BUILD = PROJECT["build-system"]["requires"]
 ALWAYS = [*BUILD, *PROJECT["project"]["dependencies"]]
 DIRECT = {

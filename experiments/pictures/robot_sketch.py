@@ -1,4 +1,4 @@
-"""Draws the robot from the side at one row of a walk: body, arm and plate at their measured positions."""
+"""Draws the robot from the side: body, arm and plate, in mud and air."""
 
 from typing import Any
 
@@ -39,7 +39,13 @@ def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
 
 def draw_robot(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) -> None:
     """Draw the robot at the last of these rows, and the path of the plate's lower edge over all of them."""
-    view, colour = view_of(walk, rows[-1], origin_m), FLIPPER_COLOURS[walk.flipper]
+    draw_view(panel, view_of(walk, rows[-1], origin_m), walk.flipper)
+    edges = [view_of(walk, row, origin_m).edge for row in rows]
+    panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)
+
+
+def draw_view(panel: Axes, view: SideView, flipper: str) -> None:
+    colour = FLIPPER_COLOURS[flipper]
     _draw_body(panel, *view.shoulder)
     panel.add_patch(Polygon(view.plate, facecolor=colour, edgecolor=colour, linewidth=1.0, joinstyle="round"))
     panel.plot(*zip(view.shoulder, view.wrist, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")
@@ -48,8 +54,6 @@ def draw_robot(panel: Axes, walk: RecordedWalk, rows: range, origin_m: float) ->
     panel.add_patch(veil)
     (left_m, right_m), (low_m, _) = panel.get_xlim(), panel.get_ylim()
     veil.set_clip_path(Rectangle((left_m, low_m), right_m - left_m, -low_m, transform=panel.transData))
-    edges = [view_of(walk, row, origin_m).edge for row in rows]
-    panel.plot(*zip(*edges, strict=True), color=TRAIL, linewidth=1.3, zorder=4)
 
 
 def _draw_body(panel: Axes, x_m: float, z_m: float) -> None:
