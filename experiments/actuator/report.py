@@ -1,7 +1,8 @@
 """The report of the actuator calibration, for programs and for people: the paper's numbers next to ours."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from pandas import DataFrame
 
@@ -81,46 +82,25 @@ def make_result(
     plan: WeighingPlan, readings: Readings, fits: Sequence[JointFit], applied: str | None, simulated: bool
 ) -> Result:
     """Return tables, figures and numbers. `applied` is a message on the configuration file."""
-    tables, figures = [_constant_table(fits), _friction_table(fits)], list[Figure]()
     left_out = [  # skipped, or kept as doubtful and not fitted
         {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
         for joint, entries in readings.items()
         for step in steps_of(plan)
         if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
     ]
-    if simulated:
-        tables.append(Table("truth", TRUTH, {}, DataFrame(truth_rows(fits)), TRUTH))
-    for fit in fits:
-        section = f"Weights on {fit.numbers['joint']}"
-        tables.append(Table(section, "", {}, _weight_rows(fit), section, on_page_only=True))
-    if left_out:
-        tables.append(Table("left_out", "", {}, DataFrame(left_out), "Left out", on_page_only=True))
-    if fits:
-        figures.append(Figure("torques", TORQUES, partial(draw_torques, fits), CONSTANTS))
-        if all(fit.loops for fit in fits):
-            figures.append(Figure("friction", LOOPS, partial(draw_friction, fits), FRICTION))
+    tables = _tables(fits, left_out, simulated)
     method = METHOD.format(
         lever_mm=1000.0 * plan.lever_tolerance_m,
         weight_percent=100.0 * plan.weight_tolerance,
         lever_cm=100.0 * plan.lever_m,
         millimetre_percent=0.1 / plan.lever_m,
     )
-    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
-    not_fitted = [joint for joint in plan.joints if joint not in directions]
-    upward = [joint for joint, direction in directions.items() if direction > 0 and joint.endswith("adduction")]
-    remarks = [
-        *(f"{joint}: too few readings for a line" for joint in not_fitted),
-        *(
-            f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
-            for joint in upward
-        ),
-        f"{len(left_out)} readings are left out: see the report" if left_out else "",
-        applied or "",
-    ]
+    fitted = [fit.numbers["joint"] for fit in fits]
+    not_fitted = [joint for joint in plan.joints if joint not in fitted]
     texts = {CONSTANTS: DEFINITIONS, **{table.section: "" for table in tables[1:]}}
     return Result(
         tables=tables,
-        figures=figures,
+        figures=_figures(fits),
         summary={
             "plan": plan,
             "joints": [fit.numbers for fit in fits],
@@ -132,8 +112,39 @@ def make_result(
         },
         title=TITLE,
         texts=texts | {"What to set where": SETTING, "How it was measured": method},
-        notes=[*filter(None, remarks)],
+        notes=[*_remarks(fits, not_fitted, len(left_out)), *filter(None, [applied])],
     )
+
+
+def _tables(fits: Sequence[JointFit], left_out: Sequence[Mapping[str, Any]], simulated: bool) -> list[Table]:
+    tables = [_constant_table(fits), _friction_table(fits)]
+    if simulated:
+        tables.append(Table("truth", TRUTH, {}, DataFrame(truth_rows(fits)), TRUTH))
+    for fit in fits:
+        section = f"Weights on {fit.numbers['joint']}"
+        tables.append(Table(section, "", {}, _weight_rows(fit), section, on_page_only=True))
+    if left_out:
+        tables.append(Table("left_out", "", {}, DataFrame(left_out), "Left out", on_page_only=True))
+    return tables
+
+
+def _figures(fits: Sequence[JointFit]) -> list[Figure]:
+    if not fits:
+        return []
+    figures = [Figure("torques", TORQUES, partial(draw_torques, fits), CONSTANTS)]
+    if all(fit.loops for fit in fits):
+        figures.append(Figure("friction", LOOPS, partial(draw_friction, fits), FRICTION))
+    return figures
+
+
+def _remarks(fits: Sequence[JointFit], not_fitted: Sequence[str], left_out: int) -> Iterator[str]:
+    for joint in not_fitted:
+        yield f"{joint}: too few readings for a line"
+    for joint, direction in ((fit.numbers["joint"], fit.numbers["direction"]) for fit in fits):
+        if direction > 0 and joint.endswith("adduction"):
+            yield f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
+    if left_out:
+        yield f"{left_out} readings are left out: see the report"
 
 
 def _constant_table(fits: Sequence[JointFit]) -> Table:
