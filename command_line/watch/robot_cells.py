@@ -34,6 +34,7 @@ REASONS = {
     "extraction": "the shallowest: the mud holds flippers",
     "deepest that comes out": "the deepest that comes out of the mud",
     "nothing known of the thrust, depth kept": "kept, the thrust is not known yet",
+    "nothing known of the thrust, deeper": "deeper, no mud was felt",
 }
 SLIPS = ", slips"
 SLIPPING = 0.5  # of a full step: then the stride is one that slips

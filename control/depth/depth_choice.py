@@ -16,10 +16,14 @@ felt during the insertion: in simulated clay of 3 to 5 kPa, at 2.5 and 3 cm, the
 times that of the insertion. So an insertion ends at 1/1.3 of the torque that an extraction may take, and the stride
 continues at the depth commanded by then. (Under the stance's load the flipper sinks further, by up to 1 cm.)
 
+Mud can be too soft to be felt: the torques of the stance are then those of friction, and nothing is known of the
+thrust. A body that stays where it is will do so at the same depth, so the next stride is deeper by a quarter.
+
 The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its width and depth.
 """
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import NamedTuple, Protocol
 
 from control.computing.bounded_work import Work, batched
@@ -32,6 +36,7 @@ from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
+DEEPER = 1.25  # of a depth at which mud was not felt: half as much force again, since it grows with the depth squared
 DEPTHS_PER_UNIT, STEPS_PER_UNIT, EXTRACTIONS_PER_UNIT = 3, 4, 4  # of bounded work: less than half a tick
 
 
@@ -121,7 +126,7 @@ class DepthAdaptation:
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:
-        """Choose the next stride; without an estimate of the thrust it stays the same, unless a flipper was stuck."""
+        """Choose the next stride; without an estimate of the thrust a body that stays behind wants a deeper one."""
         self.forecast.update(mud_estimate, strides, walked_m)
         yield
         stuck = any(not stride.released for stride in strides)
@@ -130,9 +135,21 @@ class DepthAdaptation:
             index, reason = yield from self._fastest(steps_m or [0.0] * len(self.candidates))
             slips = bool(steps_m) and steps_m[index] < self.geometry.flipper_length_m / 2.0
             self.choice = self._choice_of(self.candidates[index], slips, "a flipper was stuck" if stuck else reason)
+        elif any(isfinite(stride.depth_m) for stride in strides) and not self._advances(strides):
+            self.choice = self._deeper(walked_m)
         else:
             self.choice = self.choice._replace(reason="nothing known of the thrust, depth kept")
         return self.choice
+
+    def _advances(self, strides: Sequence[StrideEstimate]) -> bool:
+        return any(stride.step_m > self.geometry.flipper_length_m / 2.0 for stride in strides)
+
+    def _deeper(self, walked_m: float) -> DepthChoice:
+        """Return the next stride where the mud was too soft to be felt: it would stay so at the same depth."""
+        gait = self.choice.gait or self.gait
+        same_gait = [each for each in self.candidates if each.gait == gait]
+        deeper = (each for each in same_gait if each.depth_m >= DEEPER * walked_m)
+        return self._choice_of(next(deeper, same_gait[-1]), False, "nothing known of the thrust, deeper")
 
     @property
     def largest_insertion_nm(self) -> float:

@@ -1,5 +1,7 @@
 """The choice of the next depth, against a search of every depth, and in synthetic clay."""
 
+from dataclasses import replace
+from itertools import pairwise
 from math import inf, log, nan, radians
 from typing import NamedTuple
 
@@ -145,13 +147,28 @@ class TestTheFastestDepth:
 class TestUnknownMud:
     @pytest.mark.parametrize(
         ("mud_estimate", "strides"),
-        [(estimated(None, STICKY), both()), (NOTHING_KNOWN, both()), (estimated(FIRM, LOOSE), [])],
+        [
+            (estimated(None, STICKY), [replace(each, step_m=0.07) for each in both()]),
+            (NOTHING_KNOWN, both(depth_m=nan)),
+            (estimated(FIRM, LOOSE), []),
+        ],
+        ids=["the body advances", "nothing was measured", "no stride"],
     )
     def test_without_an_estimate_of_the_thrust_the_depth_stays(
         self, mud_estimate: MudEstimate, strides: list[StrideEstimate]
     ) -> None:
         kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
         assert chosen(mud_estimate, strides, 0.0375) == kept
+
+    @pytest.mark.parametrize("step_m", [0.0, nan])
+    def test_mud_that_is_too_soft_to_be_felt_is_tried_deeper_until_the_deepest(self, step_m: float) -> None:
+        adaptation, walked_m = adapted(PARAMETERS), [0.02]
+        adaptation.reset(0.02)
+        for _ in range(6):
+            choose_now(adaptation, NOTHING_KNOWN, [replace(each, step_m=step_m) for each in both()])
+            walked_m.append(adaptation.choice.depth_m)
+        assert all(deeper <= 1.4 * depth for depth, deeper in pairwise(walked_m))
+        assert walked_m[1:3] == sorted(set(walked_m[1:3])) and walked_m[-1] == PARAMETERS.max_depth_m
 
     def test_a_walk_starts_at_the_configured_depth_and_a_reset_at_its_own(self) -> None:
         adaptation = adapted(AdaptationParameters(initial_depth_m=0.04))
