@@ -129,14 +129,14 @@ def compared_strides(plan: WalkTrials, walks: Walks, reach_m: float, truth: Trut
     for group, walk in ((group, walk) for group, own in walks.items() for walk in own):
         for method, strides in walk["strides"].items():
             for index, stride in enumerate(strides):
-                keys: Row = {"mud": group, "method": method}
+                keys: Row = {"mud": group, "method": method, "trial": walk["trial"]}
                 mud = soft.get(group)
                 if mud is None:
                     plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
                     if stride["place_m"] is not None and walk["start_m"] is not None:
                         plates_m = stride["place_m"] - walk["start_m"] + reach_m
                     mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
-                    keys |= {"mud": mud, "plates_m": plates_m, "trial": walk["trial"]}
+                    keys |= {"mud": mud, "plates_m": plates_m}
                 elif index == 0:
                     continue
                 known = truth_in(truth, mud) if truth else walk["truths"].get(str(stride["index"]), {})

@@ -209,6 +209,13 @@ def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> Non
     assert spread["mud"].tolist() == [mud for mud in ("a", "b", "b", "b") for _ in COEFFICIENTS]
 
 
+def test_strides_in_soft_mud_belong_to_their_trial_within_which_they_scatter() -> None:
+    plan = replace(SHORT, soft=("53.1",))
+    entry = {"trial": 2, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride()] * 2}}
+    strides = compared_strides(plan, {plan.soft_walks[0][0]: [entry]}, 0.06, None)
+    assert strides["trial"].tolist() == [2] * len(COEFFICIENTS)  # the first stride is left out
+
+
 # the advance of a walk
 
 
