@@ -8,6 +8,7 @@ pauses of 3 s stays small.
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pandas import DataFrame
 
 from control.modes import Mode
@@ -23,7 +24,16 @@ DIGITS = 6  # after the point: a microsecond, a micrometre, a micronewton
 
 def walk_profile(log: Log, flipper: str, period: int = 1) -> DataFrame:
     """Return every row of all strides, or one in a period, at `time_s` by the robot's clock."""
-    rows, side = log.ticks[log.ticks["mode"] == Mode.WALKING][::period], log.rig.flippers.index(flipper)
+    return _profile_of_rows(_walking_rows(log)[::period], log, flipper)
+
+
+def _walking_rows(log: Log) -> NDArray[np.void]:
+    rows: NDArray[np.void] = log.ticks[log.ticks["mode"] == Mode.WALKING]
+    return rows
+
+
+def _profile_of_rows(rows: NDArray[np.void], log: Log, flipper: str) -> DataFrame:
+    side = log.rig.flippers.index(flipper)
     profile = {name: rows[name] for name in COLUMNS} | {name: rows[name][:, side] for name in OF_FLIPPER}
     angles_rad = rows["angle_rad"][:, 2 * side : 2 * side + 2].T
     profile |= dict(zip(("sweep_rad", "adduction_rad"), angles_rad, strict=True))
@@ -32,10 +42,10 @@ def walk_profile(log: Log, flipper: str, period: int = 1) -> DataFrame:
 
 def profile_of(log: Log, flipper: str, start_s: float) -> DataFrame:
     """Return the stride under way at `start_s`, at `time_s` from its first row on; no rows where there is none."""
-    walked = walk_profile(log, flipper)
-    under_way = walked.loc[walked["time_s"] >= start_s, "stride"].head(1)
-    rows = walked[walked["stride"].isin(under_way) & (walked["stride"] >= 0)]
-    return rows.assign(time_s=rows["time_s"] - rows["time_s"].min()).reset_index(drop=True)
+    rows = _walking_rows(log)
+    under_way = rows["stride"][rows["stamp_s"] >= start_s][:1]
+    profile = _profile_of_rows(rows[np.isin(rows["stride"], under_way) & (rows["stride"] >= 0)], log, flipper)
+    return profile.assign(time_s=profile["time_s"] - profile["time_s"].min())
 
 
 def stroke_of(profile: DataFrame, phase: Phase) -> DataFrame:
