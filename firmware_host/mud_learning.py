@@ -163,7 +163,7 @@ class MudLearning:
         """Choose the depth of the next stride, and its gait if the method chooses that too; return messages."""
         gait = controller.gait
         if not order.adaptive:
-            gait.next_depth_m = order.depth_of(strides[0].index + 1) if strides else order.depth_m
+            gait.next_depth_m = order.depth_of(gait.stride + 1)  # that of a late choice is one later
             self.depth_reason = "in turn" if order.depths_m else "fixed"
             return []
         choice = yield from self.adaptation.choose(self.estimator.mud_estimate, strides, walked_m)

@@ -32,3 +32,8 @@ class JointLimits:
     position_margin_deg: Annotated[
         float, Bounds(0.0, 90.0), Meaning("beyond a joint's range by this much is a fault")
     ] = 10.0
+
+    @property
+    def widest_sweep_deg(self) -> float:
+        """The widest sweep, from plus to minus this angle, within the range of the sweep joints."""
+        return min(-self.sweep_min_deg, self.sweep_max_deg)

@@ -220,7 +220,7 @@ def _sweep_problems(configuration: Configuration) -> Iterator[str]:
     geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
     widest_deg = adaptation.gait.max_sweep_deg
     widest = f"adaptation.gait.max_sweep_deg = {widest_deg}"
-    within_deg = min(-limits.sweep_min_deg, limits.sweep_max_deg)
+    within_deg = limits.widest_sweep_deg
     reached_m = geometry.deepest_m(widest_deg)
     if adaptation.gait.min_sweep_deg > widest_deg:
         yield f"adaptation.gait.min_sweep_deg = {adaptation.gait.min_sweep_deg}: must be at most {widest}"

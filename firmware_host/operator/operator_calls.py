@@ -210,7 +210,7 @@ class OperatorCalls:
         given = {key: params[key] for key in GAIT_UNITS if params.get(key) is not None}
         gait = replace(self._loop.controller.gait.next_parameters, **given)
         configuration, sweep_deg = self._loop.configuration, gait.sweep_angle_deg
-        widest_deg = min(-configuration.limits.sweep_min_deg, configuration.limits.sweep_max_deg)
+        widest_deg = configuration.limits.widest_sweep_deg
         if sweep_deg > widest_deg:
             raise RefusedError(f"sweep_angle_deg = {sweep_deg:g}: must be at most {widest_deg:g}, the joint's range")
         deepest_m = configuration.geometry.deepest_m(sweep_deg)

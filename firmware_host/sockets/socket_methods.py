@@ -95,12 +95,10 @@ class Parameter(NamedTuple):
             case Type.TEXT:
                 return isinstance(value, str) and len(value) <= self.longest and value.isprintable()
             case Type.INTEGER:
-                fits = isinstance(value, int)
+                fits = isinstance(value, int) and not isinstance(value, bool)
             case Type.NUMBER:
                 fits = _is_number(value)
-        if not fits or isinstance(value, bool):
-            return False
-        return self.range is None or self.range.minimum <= value <= self.range.maximum
+        return fits and (self.range is None or self.range.minimum <= value <= self.range.maximum)
 
 
 def _is_number(value: Any) -> bool:

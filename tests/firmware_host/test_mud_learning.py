@@ -37,6 +37,7 @@ def stride(flipper: str = "left", index: int = 0, **changes: Any) -> StrideEstim
 class FakeGait:
     """The part of a gait that learning uses."""
 
+    stride: int = 0
     commanded_depth_m: float = 0.03
     next_depth_m: float = 0.03
     parameters: GaitParameters = GaitParameters()
