@@ -119,25 +119,25 @@ class AlteredRobot(LockstepRobot):
 
 
 @pytest.mark.parametrize(
-    ("pose", "asked", "why"),
+    ("pose", "from_s", "order", "why"),
     [
-        (lambda now_s, x_m: x_m if now_s < 4.0 else None, (0.0, ""), "pose of the body is lost"),
-        (lambda now_s, x_m: x_m and -x_m, (0.0, ""), "reverse pose.axis"),
-        (lambda now_s, x_m: x_m, (5.0, "stop"), "was stopped"),
-        (lambda now_s, x_m: x_m, (5.0, "disarm"), "torque was switched off"),
+        (lambda now_s, x_m: x_m if now_s < 4.0 else None, 4.0, "", "pose of the body is lost"),
+        (lambda now_s, x_m: x_m and -x_m, 4.0, "", "reverse pose.axis"),
+        (lambda now_s, x_m: x_m, 5.0, "stop", "was stopped"),
+        (lambda now_s, x_m: x_m, 5.0, "disarm", "torque was switched off"),
     ],
 )
 def test_a_walk_without_a_right_pose_or_that_another_client_stops_is_invalid(
-    pose: Callable[[float, float | None], float | None], asked: tuple[float, str], why: str, tmp_path: Path
+    pose: Callable[[float, float | None], float | None], from_s: float, order: str, why: str, tmp_path: Path
 ) -> None:
     bench = make_bench(tmp_path)
     robot = bench.robot
     robot.__class__ = AlteredRobot
     assert isinstance(robot, AlteredRobot)
-    robot.pose, robot.asked = pose, asked
+    robot.pose, robot.asked = pose, (from_s, order)
     with pytest.raises(InvalidTrialError) as invalid:
         measure(bench, SHORT, SHORT.planned[0])
-    assert robot.call("status")["mode"] in ("idle", "fault") and robot.lockstep.now_s < 5.0 + UNSEEN_S + 5.0
+    assert robot.call("status")["mode"] in ("idle", "fault") and robot.lockstep.now_s < from_s + UNSEEN_S + 5.0
     entry = invalid.value.entry
     assert entry and why in entry["fault"] and entry["fault"] in str(invalid.value)
     assert entry["strides"] or "reverse" in why  # read from its log
