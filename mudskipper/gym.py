@@ -9,8 +9,9 @@ which a robot has from its rail encoder or motion capture.
 
     reward = 100 (advance in m) - 0.1 (energy in J) - 5 if a flipper was stuck - 20 if a fault ended the walk
 
-The energy is the positive work of the motors. `info` has the parts. A seed draws the ground of `reset`: patches of mud
-with strengths, friction and noise in the ranges of the authors' logs (simulation/mud/disturbances.py).
+The energy is the motors' work in the stride, summed over the joints in which it is positive. `info` has the parts. A
+seed draws the ground of `reset`: patches of mud with strengths, friction and noise in the ranges of the authors' logs
+(simulation/mud/disturbances.py).
 """
 
 from dataclasses import replace

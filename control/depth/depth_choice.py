@@ -126,7 +126,7 @@ class DepthAdaptation:
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:
-        """Choose the next stride; without an estimate of the thrust a body that stays behind wants a deeper one."""
+        """Choose the next stride; without an estimate of the thrust a deeper one where the body does not advance."""
         self.forecast.update(mud_estimate, strides, walked_m)
         yield
         stuck = any(not stride.released for stride in strides)

@@ -40,8 +40,8 @@ def study(
     rows = [{"strength_pa": each, "seed": seed, **walked} for each in strength for seed in range(1, seeds + 1)]
     walks = trials.run(walk, rows)
     table = DataFrame(
-        {"strength_pa": walk["strength_pa"], "seed": walk["seed"], "coefficient": name, **walk[name]}
-        for _, walk in walks.iterrows()
+        {"strength_pa": row["strength_pa"], "seed": row["seed"], "coefficient": name, **row[name]}
+        for _, row in walks.iterrows()
         for name in LAWS
     )
     laws = Table("laws", "Exponent of depth by mud and walk", {"strength_pa": "Pa"}, table)

@@ -39,4 +39,4 @@ class Finding(NamedTuple):
 
 def of_whole_log(kind: FindingKind, text: str) -> Finding:
     """Return a finding that belongs to no row and no column."""
-    return Finding(kind, "", math.nan, 0, text)
+    return Finding(kind, column="", time_s=math.nan, line=0, text=text)

@@ -31,7 +31,8 @@ class LogRows(NamedTuple):
         return np.isin(self.phase, GAIT_PHASES)
 
     def report(self, kind: FindingKind, column: str, row: int, text: str) -> None:
-        self.findings.append(Finding(kind, column, float(self.time_s[row]), int(self.line[row]), text))
+        time_s, line = float(self.time_s[row]), int(self.line[row])
+        self.findings.append(Finding(kind, column=column, time_s=time_s, line=line, text=text))
 
     def refusal(self, kind: FindingKind, column: str, row: int, text: str) -> LogError:
         """Return the error of a log in which every number is wrong."""

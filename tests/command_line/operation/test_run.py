@@ -20,7 +20,7 @@ MODE = {"fault": None, "notice": "", "stride": 0, "phase": "swing", "depth_m": 0
 
 
 class WalkOfTwoStrides(StatusClient):
-    """A daemon whose robot closes a stride of both flippers with every second status, and stops when it is told to."""
+    """A daemon whose robot closes a stride of both flippers with every second status, and stops on request."""
 
     def __init__(self, _: Path, refusal: str = "") -> None:
         self.orders: list[dict[str, Any]] = []
