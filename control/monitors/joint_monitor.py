@@ -30,6 +30,7 @@ STILL_RAD = 0.03
 REST_S = 0.1  # within STILL_RAD: the joint is at rest
 SATURATED_FRACTION = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
+RETURNING_S = 0.3  # at full torque back into the range: a motor that turns the wrong way presses against the stop there
 MISSING_FRACTION = 0.3  # of the torque limit: difference between commanded and measured torque
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # two messages at an interval of 0.1 s: a single outlier is no fault
@@ -66,6 +67,7 @@ class JointMonitor:
         self.winding = Winding(winding)
         self._limits = limits
         self._bounds = bounds
+        self._span = span
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
@@ -189,7 +191,9 @@ class JointMonitor:
     ) -> None:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
-            found.append(self._out_of_range(angle_rad))
+            found.append(self._out_of_range(angle_rad, self._low_rad, self._high_rad))
+        elif self._stalled_s > RETURNING_S and not self._span.min_rad <= angle_rad <= self._span.max_rad:
+            found.append(self._out_of_range(angle_rad, *self._span))
         self._fast_s = self._fast_s + seen_s if velocity_rad_s > self._fast_rad_s else 0.0
         if self._fast_s and self._fast_s > max(self._bounds.fast_s - seen_s / 2.0, 0.0):
             limit_rad_s = self._limits.velocity_rad_s
@@ -209,9 +213,9 @@ class JointMonitor:
         else:
             self._motion.update(found, state, seen_s, torque_nm, target)
 
-    def _out_of_range(self, angle_rad: float) -> Fault:
-        low, high = degrees(self._low_rad), degrees(self._high_rad)
-        return self._fault(FaultKind.JOINT_POSITION, angle_deg=degrees(angle_rad), low_deg=low, high_deg=high)
+    def _out_of_range(self, angle_rad: float, low_rad: float, high_rad: float) -> Fault:
+        low_deg, high_deg = degrees(low_rad), degrees(high_rad)
+        return self._fault(FaultKind.JOINT_POSITION, angle_deg=degrees(angle_rad), low_deg=low_deg, high_deg=high_deg)
 
     # load
 

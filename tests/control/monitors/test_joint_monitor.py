@@ -5,7 +5,7 @@ The figures are ticks of 1 / 380 s, pinned without the module's own constants.
 
 from __future__ import annotations
 
-from math import inf, isfinite, nan, nextafter, radians
+from math import copysign, inf, isfinite, nan, nextafter, radians
 from random import Random
 from typing import Any
 
@@ -84,6 +84,15 @@ def test_a_fault_begins_in_its_tick(name: str, state: Changes, tick: Changes, ti
     found = [name in names_of(monitor, healthy(**state), **tick) for _ in range(ticks + 1)]
     assert found == [False] * (ticks - 1) + [True] * 2
     assert ticks <= FAULT_KINDS[name].bound_ticks
+
+
+@pytest.mark.parametrize(("angle_deg", "found_after"), [(60.1, 114), (-69.9, 114), (60.0, None), (-60.0, None)])
+def test_a_joint_that_full_torque_does_not_bring_back_is_outside_of_its_range(
+    angle_deg: float, found_after: int | None
+) -> None:
+    monitor, state = make_monitor(), healthy(angle_rad=radians(angle_deg), current_a=9.0)
+    found = ["joint_position" in names_of(monitor, state, torque_nm=-copysign(FULL_NM, angle_deg)) for _ in range(700)]
+    assert found == [found_after is not None and tick >= found_after for tick in range(700)]
 
 
 @pytest.mark.parametrize(
