@@ -315,15 +315,21 @@ class EnergyRise:
 
 
 class LittleEnergy(Promise):
-    """While the robot brakes its joints, our torque puts hardly any energy into one."""
+    """While the robot brakes its joints, our torque puts hardly any energy into one.
+
+    The work until the end of the tick that enters DAMPING is that of the commands before, which BoundedEnergy counts:
+    after a stall that is all that the last torque did until a watchdog ended it.
+    """
 
     MOST_J = 1.0  # a motor with inverted torque is detected by then
 
     def begin(self) -> None:
         self._rise = EnergyRise(self.robot, self.reach)
+        self._was_damping = False
 
     def update(self) -> Iterator[str]:
-        if self.loop.mode is not Mode.DAMPING:
+        was_damping, self._was_damping = self._was_damping, self.loop.mode is Mode.DAMPING
+        if not (was_damping and self._was_damping):
             self._rise.reset()
             return
         energy_j, joint = self._rise.largest_j()

@@ -40,8 +40,13 @@ class Reachability:
         self.update()
 
     def update(self) -> None:
-        """Call this before and after every tick."""
-        now_s, missed = self._robot.now_s, self._robot.loop.missed_ticks
+        """Call this before and after every tick.
+
+        A failure that the schedule has not ended lasts while the process stands still inside of a tick: the mechanics
+        are ahead of the tick then.
+        """
+        now_s = max(self._robot.now_s, self._robot.lockstep.robot.now_s)
+        missed = self._robot.loop.missed_ticks
         if missed != self._missed:
             self.stalled_s += (missed - self._missed) * self._period_s
             self._missed, self._late_s = missed, now_s

@@ -211,4 +211,45 @@ REGRESSIONS = (
             for_s=0.34,
         ),
     ),
+    Regression(
+        "the torque of another program was counted as ours after the loop stood still within a tick",
+        Scenario(
+            seed=7320128,
+            surroundings=Surroundings(seed=0),
+            start="extraction",
+            events=(
+                Suspend(at_s=0.169, for_s=0.036, inside="drives.send"),
+                Failure(
+                    at_s=0.17, component="left_sweep.master", kind="after every second command, unheard", for_s=0.017
+                ),
+            ),
+            for_s=0.255,
+        ),
+    ),
+    Regression(
+        "the work of the last torque before a stall was counted as work of the damping after it",
+        Scenario(
+            seed=7320208,
+            surroundings=Surroundings(
+                seed=0,
+                depth_m=0.017,
+                drive_type="moteus",
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.4),
+                    ("motion.fade_in_s", 0.1),
+                    ("gait.swing_duration_s", 0.6),
+                    ("gains.sweep_stiffness_nm_rad", 9.9),
+                    ("gains.adduction_stiffness_nm_rad", 10.0),
+                    ("limits.torque_nm", 0.6),
+                    ("adaptation.motor_force_n", 5.0),
+                ),
+            ),
+            start="stance",
+            events=(
+                Suspend(at_s=0.269, for_s=0.025, inside="fault_monitor.update"),
+                Failure(at_s=0.269, component="loop", kind="stuck", for_s=0.013),
+            ),
+            for_s=0.344,
+        ),
+    ),
 )
