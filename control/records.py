@@ -91,7 +91,8 @@ def same_for_each(sweep: T, adduction: T, rig: Rig = TWO_FLIPPERS) -> Joints[T]:
 class Phase(IntEnum):
     """The phase of a stride. REST is outside of any stride, PAUSE is a short rest between two phases.
 
-    RECOVERY comes before the swing if a flipper is still stuck in the mud.
+    RECOVERY comes before the swing if a flipper is still stuck in the mud. STROKE is a path that does what insertion,
+    stance and extraction do at once, as an ellipse.
     """
 
     REST = 0
@@ -101,6 +102,7 @@ class Phase(IntEnum):
     SWING = 4
     PAUSE = 5
     RECOVERY = 6
+    STROKE = 7
 
 
 class DriveState(NamedTuple):

@@ -14,12 +14,12 @@ that ends before the units finishes them at once.
 
 from collections.abc import Sequence
 from functools import partial
-from math import cos, hypot, isfinite, sin
+from math import copysign, cos, hypot, isfinite, sin
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
-from control.plate_integrals import growth_exponent
+from control.plate_integrals import cross_coupling, growth_exponent, submerged_plate
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between
@@ -41,7 +41,7 @@ from estimation.strokes.stroke_fit import (
     level_free,
     levelling_m,
 )
-from estimation.strokes.surface import Surface, find_surface
+from estimation.strokes.surface import NO_SURFACE, Surface, find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
 from estimation.strokes.tare import Tare, Zero
 
@@ -50,6 +50,7 @@ OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a st
 TWO_SURFACES = "the strokes find two surfaces"
 NO_MUD = "no evidence of mud: the torques are those of friction"
 DRAGGED = "the swing drags mud: its torque is too much of the stance's"
+HIGHEST_SURFACE = 3.0  # standard errors above the nominal height
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
 CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 
@@ -98,7 +99,8 @@ class FlipperEstimator(StrideEstimator):
         self._surfaces.reset()
         self._own_surfaces.reset()
         self._extractions.reset()
-        self._travel_m = UNKNOWN
+        self._travel_m = self._swept_m = UNKNOWN
+        self._direction = 1.0  # of a stance that pushes the body forward: it begins in front of the joint; -1: backward
         self._is_fitting = self._is_taring = False  # the work of the last insertion
         self._waiting: list[tuple[float, Phase, JointLoad, float]] = []  # samples, until the tare is corrected
         super().reset()
@@ -123,10 +125,14 @@ class FlipperEstimator(StrideEstimator):
         sweep_nm, adduction_nm = self._update_load(phase, load)
         stroke = self._strokes.get(phase)
         if stroke is not None:
-            self._travel_m = self.geometry.flipper_length_m * sweep_rad if phase is Phase.STANCE else depth_m
-            stroke.update(
-                now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_x_m, load.saturated
-            )
+            pose_and_load = sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_x_m, load.saturated
+            swept_m = self.geometry.flipper_length_m * sweep_rad
+            self._travel_m = swept_m if phase is Phase.STANCE else depth_m
+            stroke.update(now_s, self._travel_m, *pose_and_load)
+            if self._is_path and depth_m > 0.0:
+                self._strokes[Phase.STANCE].update(now_s, swept_m, *pose_and_load)
+                self._swept_m = swept_m
+                self._record_extremes(Phase.STANCE, self.load, body_x_m)
             if phase is not Phase.EXTRACTION:
                 self._deepest_m = larger(depth_m, self._deepest_m)
             self._record_extremes(phase, self.load, body_x_m)
@@ -146,11 +152,13 @@ class FlipperEstimator(StrideEstimator):
         friction_nm, weight_n = self._air.friction_nm, self._tare.zero.weight_n
         sweep_nm = load.sweep_nm + weight_n * load.rise_sweep_m
         adduction_nm = load.adduction_nm + weight_n * self._rise_m(load)
-        if phase is Phase.STANCE:
-            return sweep_nm - friction_nm, adduction_nm
+        if phase is Phase.STANCE or (self._is_path and phase in self._strokes):
+            sweep_nm -= self._direction * friction_nm
         if phase is Phase.INSERTION:
-            return sweep_nm, adduction_nm - friction_nm
-        return sweep_nm, adduction_nm + friction_nm if phase is Phase.EXTRACTION else adduction_nm
+            adduction_nm -= friction_nm
+        elif phase is Phase.EXTRACTION:
+            adduction_nm += friction_nm
+        return sweep_nm, adduction_nm
 
     @staticmethod
     def _rise_m(load: JointLoad) -> float:
@@ -163,7 +171,9 @@ class FlipperEstimator(StrideEstimator):
             self._strokes[ended].close(now_s, self._travel_m)
         if ended is Phase.INSERTION:
             self._is_fitting = self._is_taring = True
-            self.work.add(self._learn_insertion(self._strokes[Phase.INSERTION]))
+            self.work.add(self._learn_insertion(self._strokes[Phase.INSERTION], self._is_path))
+        elif ended is Phase.EXTRACTION:
+            self._strokes[Phase.STANCE].close(now_s, self._swept_m)  # of a path, which does both at once
 
     def _finish_insertion(self) -> None:
         if self._is_fitting:
@@ -171,22 +181,29 @@ class FlipperEstimator(StrideEstimator):
 
     def _begin_phase(self, phase: Phase) -> None:
         if phase is Phase.INSERTION:
+            self._direction = copysign(1.0, self._loads.angles_rad[0])
             self._finish_insertion()
             self._air.close()
             self._tare.set_zero(self._air.is_air)
 
-    def _learn_insertion(self, insertion: Stroke) -> Work[None]:
+    def _learn_insertion(self, insertion: Stroke, is_path: bool) -> Work[None]:
         """Find the surface and correct the tare by the force above it.
 
-        The fit of k_p is queued last, so that no flipper's tare waits for the fit of another flipper.
+        The fit of k_p is queued last, so that no flipper's tare waits for the fit of another flipper. On a path the
+        load across the face is as large as in a stance, so it is subtracted before the surface is known; and a path
+        that begins at the surface shows neither the surface nor the force above it.
         """
         batches = insertion.moving()
         length_m, arm_m = self.geometry.flipper_length_m, hypot(self.geometry.flipper_length_m, self.geometry.drop_m)
         depths_m = [b.travel_m for b in batches]
-        forces_n = [b.adduction_nm / (arm_m * cos(b.sweep_rad)) for b in batches]
+        across_nm = [_across_nm(self.geometry, b) if is_path else 0.0 for b in batches]
+        forces_n = [
+            (b.adduction_nm - across) / (arm_m * cos(b.sweep_rad)) for b, across in zip(batches, across_nm, strict=True)
+        ]
         samples = sum([b.samples for b in batches])
         sample_m = (depths_m[-1] - depths_m[0]) / samples if samples else 0.0
-        found = yield from find_surface(depths_m, forces_n)
+        begins_in_air = not is_path or (depths_m and depths_m[0] < -HIGHEST_SURFACE * self.surface_error_m)
+        found = (yield from find_surface(depths_m, forces_n)) if begins_in_air else NO_SURFACE
         yield
         surface = self._surfaces.update(found, sample_m)
         level_n, level_error_n = (value * arm_m / length_m for value in surface[2:4])
@@ -222,6 +239,8 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Work[Learned]:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
+        if self._direction < 0.0:
+            stance.mirror()
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
             dragged = self._air.is_dragging(self._pushed_nm(stance.batches))
@@ -298,6 +317,12 @@ class FlipperEstimator(StrideEstimator):
         estimate = evaluated(shear.fit, own, shared, stroke)
         at_least = shear.at_least and estimate.valid
         return estimate._replace(at_least=at_least, reason=estimate.reason or shear.reason)
+
+
+def _across_nm(geometry: FlipperGeometry, batch: Batch) -> float:
+    """Return the adduction torque of the load across the face, with the surface at its nominal height."""
+    plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad)
+    return cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
 
 
 def _named(estimate: Estimate, surface: Surface) -> Estimate:

@@ -18,6 +18,7 @@ from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, STANCES, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads, JointMotion
+from estimation.path_motion import PathMotion
 from estimation.stride_clock import StrideClock
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
 
@@ -59,12 +60,15 @@ class StrideEstimator(ABC):
         self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
         self._loads = JointLoads(geometry, drive, motion)
         self._clock = StrideClock()
+        self._motion = PathMotion()
+        self._is_path = False  # the samples are those of a path that does all strokes at once
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, the count of strides included."""
         self._loads.reset()
         self._clock.reset()
+        self._motion.reset()
         self.load = NO_LOAD
         self._body_at_close_m = UNKNOWN
         self._begin_stride(0.0, UNKNOWN)
@@ -94,10 +98,16 @@ class StrideEstimator(ABC):
         GRACE_S to come out.
         """
         closed = None
+        is_path = phase is Phase.STROKE
+        if is_path:
+            phase = self._motion.update(self.geometry.depth_m(*self._loads.angles_rad), self._is_in_mud())
+        elif self._is_path:
+            self._motion.reset()
         if phase is not self._clock.phase:
             closed = self._change_phase(now_s, phase, body_x_m)
         elif self._extracted_s < inf:
             closed = self._wait_for_exit(now_s, body_x_m)
+        self._is_path = is_path
         if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
             return NO_LOAD, closed
         load = self._loads.update(sweep, adduction, commands_s)
@@ -106,6 +116,8 @@ class StrideEstimator(ABC):
         return self.load, closed
 
     def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> Work[StrideEstimate] | None:
+        if self._is_path and self._clock.phase is Phase.EXTRACTION:
+            self._clock.duration_s[Phase.STANCE] = now_s - self._clock.start_s
         change = self._clock.change(now_s, phase)
         self._end_phase(now_s, change.ended)
         if change.ended is Phase.EXTRACTION:

@@ -45,7 +45,7 @@ BROKEN = frozenset(
     {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
 )  # detected in single ticks, but lasting until torque is off
 CATCH_UP_S = 0.3  # a sweep that the mud held at the far end of a stance needs 0.15 s for its 1 rad
-IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY})
+IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY, Phase.STROKE})
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
 BUS_FAULTS = {

@@ -99,6 +99,15 @@ class Stroke:
             )
         self._empty()
 
+    def mirror(self) -> None:
+        """Turn a stroke that pushes the body backward into the one that pushes it forward: front and rear change."""
+        self.batches = [
+            batch._replace(
+                travel_m=-batch.travel_m, sweep_rad=-batch.sweep_rad, sweep_nm=-batch.sweep_nm, body_m=-batch.body_m
+            )
+            for batch in self.batches
+        ]
+
     def moving(self) -> list[Batch]:
         """Return the batches without the slow ones at both ends: mud resists slow motion less."""
         speeds_m_s = sorted([batch.speed_m_s for batch in self.batches])

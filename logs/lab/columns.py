@@ -13,7 +13,8 @@ READ_COLUMNS = (*POSITION_COLUMNS, *CURRENT_COLUMNS, DEPTH_COLUMN, *BODY_COLUMNS
 
 PHASES_BY_STATE = (Phase.REST, Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE)
 STATE_OF_PHASE = {phase: state for state, phase in enumerate(PHASES_BY_STATE)} | {
-    Phase.RECOVERY: 5  # the authors have no such state; it is between extraction and swing, as their pauses are
+    Phase.RECOVERY: 5,  # the authors have no such state; it is between extraction and swing, as their pauses are
+    Phase.STROKE: 3,  # nor this one; most of it is a stance
 }
 PHASE_OF_STATE = {-1: Phase.REST, **dict(enumerate(PHASES_BY_STATE)), **dict.fromkeys((6, 7, 8), Phase.PAUSE)}
 
