@@ -180,8 +180,9 @@ class FlipperEstimator(StrideEstimator):
             self.work.finish()
 
     def _begin_phase(self, phase: Phase) -> None:
-        if phase is Phase.INSERTION:
+        if phase in (Phase.INSERTION, Phase.STANCE):
             self._direction = copysign(1.0, self._loads.angles_rad[0])
+        if phase is Phase.INSERTION:
             self._finish_insertion()
             self._air.close()
             self._tare.set_zero(self._air.is_air)
@@ -239,7 +240,7 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Work[Learned]:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
-        if self._direction < 0.0:
+        if self._direction < 0.0 and stance.batches and stance.batches[0].travel_m < stance.batches[-1].travel_m:
             stance.mirror()
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
