@@ -60,7 +60,7 @@ lint: .venv/test  ## run ruff and mypy --strict
 lock: .venv/setup  ## write requirements/*.txt from pyproject.toml; needs the Internet
 	@$(PIP) "uv>=0.5"
 	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen pyproject.toml - --output-file requirements/robot.txt $(ARGS)
-	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra plots --extra data --extra inputs pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
+	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra ros2 --extra plots --extra data --extra inputs pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
 	@$(LOCK) --extra plots --extra screen --extra serial --extra data --extra cluster --extra test --extra docs --extra inputs pyproject.toml --output-file requirements/development.txt $(ARGS)
 	@printf 'mypy>=1.14,<3\nsetuptools>=77\n' | $(LOCK) - --output-file requirements/compiler.txt $(ARGS)
 

@@ -52,6 +52,7 @@ COMMANDS: Mapping[str, Command] = {
     "watch": ("watch.watch.watch", "Show the robot live, with keys that operate it."),
     "fail": ("operation.failing.fail", "Make a part of the robot fail on purpose, where allowed."),
     "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),
+    "ros2": ("ros2.ros2.ros2", "Show the robot to computers with ROS 2 (rmw_zenoh), and serve its stop to them."),
     "doctor": ("doctor.doctor.doctor", "Check this computer and its buses, line by line."),
     "init": ("init.init.init", "Write a configuration for a new robot, from questions or options."),
     "install": ("install.installation.install", "Set up the service, network and users of this computer."),

@@ -13,9 +13,9 @@ NO_DAEMON = (
 )
 EXTRA_OF = {  # by module
     "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
-    "distributed": "cluster", "evdev": "inputs",
+    "distributed": "cluster", "evdev": "inputs", "zenoh": "ros2", "rosbags": "ros2",
 }  # fmt: skip
-PACKAGES = {"PIL": "pillow", "evdev": "evdev-binary"}  # whose name is not that of the module
+PACKAGES = {"PIL": "pillow", "evdev": "evdev-binary", "zenoh": "eclipse-zenoh"}  # whose name is not that of the module
 
 
 class CommandError(Exception):

@@ -3,10 +3,10 @@
 Every fourth tick has its messages (95 Hz; ticks that were thinned at rest all have them), and the diagnostics come once
 a second and with the first such tick after a stride or an event. rosbags knows the definitions and encodes.
 
-The frames follow REP 103: x forward, y left, z up, in metres. `track` is fixed, its z = 0 is the nominal surface of the
-mud; `base_link` is the intersection of the flippers' axes (the configuration knows no distance between left and right);
-`left_edge` is the middle of the plate's lower edge with the axes of the body, and `left_flipper` is there too and turns
-with the flipper, its y axis along the arm.
+The frames follow REP 103 and 105: x forward, y left, z up, in metres. `odom` is fixed, its z = 0 is the nominal surface
+of the mud; `base_link` is the intersection of the flippers' axes (the configuration knows no distance between left and
+right); `left_edge` is the middle of the plate's lower edge with the axes of the body, and `left_flipper` is there too
+and turns with the flipper, its y axis along the arm.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,19 +20,24 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.rate import RATE_HZ
 from control.records import FLIPPERS, TWO_FLIPPERS, Rig
-from firmware_host.log.rows import COEFFICIENTS, TICK
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.log.rows import COEFFICIENTS, EVENT, STRIDE, TICK, TICK_KIND, rig_of
+from operator_client.live_rows import LiveRow, LiveRows
 
 ROS = get_typestore(Stores.ROS2_HUMBLE)
 MESSAGE_HZ = 95.0
 TICKS_A_MESSAGE = max(1, round(RATE_HZ / MESSAGE_HZ))
+UNMEASURED = 1e6  # variance, in m² or rad², of what no sensor measures
 DIAGNOSTICS_S = 1.0  # between two of them
-TRACK, BASE = "track", "base_link"
+ODOM, BASE = "odom", "base_link"
 OK, WARN, ERROR = range(3)
 STRIDE_VALUES = ("index", *(f"{k}{part}" for k in COEFFICIENTS for part in ("", "_std_error")), "depth_m", "step_m")
 JOINT_VALUES = ("current_a", "temperature_c", "angle_age_s", "current_age_s")
 WORDS = {field.name: dict(enumerate(field.words)) for field in TICK.fields}
 TOPICS = {  # that a robot may have, with their messages
     "/joint_states": "sensor_msgs/msg/JointState",
+    "/odom": "nav_msgs/msg/Odometry",
     "/tf": "tf2_msgs/msg/TFMessage",
     **{f"/{flipper}/pose": "geometry_msgs/msg/PoseStamped" for flipper in FLIPPERS},
     **{f"/{flipper}/force": "geometry_msgs/msg/WrenchStamped" for flipper in FLIPPERS},
@@ -67,6 +72,11 @@ def flipper_pose(geometry: FlipperGeometry, flipper: str, sweep_rad: float, addu
     return FlipperPose((x_m, side * y_m, z_m), (sin_b * cos_a, -sin_b * sin_a, cos_b * sin_a, cos_b * cos_a))
 
 
+def variances(x_is_measured: bool) -> Any:
+    """Return a covariance in which what no sensor measures is unknown, and the error of x is not given."""
+    return np.diag([0.0 if x_is_measured else UNMEASURED, *[UNMEASURED] * 5]).ravel()
+
+
 class StandardMessages:
     """Owns the latest stride of each flipper and the latest event."""
 
@@ -75,6 +85,16 @@ class StandardMessages:
         self._strides: dict[str, Mapping[str, Any]] = {}
         self._event = ""
         self._last_tick, self._diagnosed_s = -TICKS_A_MESSAGE, -inf
+
+    def of_row(self, row: LiveRow, stamp_ns: int, wanted: bool = True) -> dict[str, bytes]:
+        """Return the messages of a tick that is due, if they are wanted; the next diagnostics have the other rows."""
+        if row.kind.topic == STRIDE.topic:
+            self.add_stride(row.values)
+        elif row.kind.topic == EVENT.topic:
+            self.add_event(row.values)
+        elif wanted and self.is_due((tick := row.values)["tick"]):
+            return self.of_tick(stamp_ns, tick)
+        return {}
 
     def add_stride(self, stride: Mapping[str, Any]) -> None:
         self._strides[FLIPPERS[bool(stride["flipper"])]] = stride
@@ -112,8 +132,15 @@ class StandardMessages:
         signals = (np.array(tick[name], float) for name in ("angle_rad", "velocity_rad_s", "torque_command_nm"))
         yield "/joint_states", make("sensor_msgs/JointState", header(BASE), list(self._rig.joints), *signals)
         body_x_m, angles_rad = float(tick["body_x_m"]), [float(angle) for angle in tick["angle_rad"]]
+        if isfinite(body_x_m):
+            position = make("geometry_msgs/Point", body_x_m, 0.0, self._geometry.axis_height_m)
+            pose = make("geometry_msgs/Pose", position, make("geometry_msgs/Quaternion", *UPRIGHT))
+            measured = make("geometry_msgs/PoseWithCovariance", pose, variances(x_is_measured=True))
+            still = make("geometry_msgs/Twist", vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+            twist = make("geometry_msgs/TwistWithCovariance", still, variances(x_is_measured=False))
+            yield "/odom", make("nav_msgs/Odometry", header(ODOM), BASE, measured, twist)
         base_m = (body_x_m if isfinite(body_x_m) else 0.0, 0.0, self._geometry.axis_height_m)
-        frames = [transform(TRACK, BASE, base_m, UPRIGHT)]
+        frames = [transform(ODOM, BASE, base_m, UPRIGHT)]
         for number, flipper in enumerate(self._rig.flippers):
             edge = f"{flipper}_edge"
             position_m, quaternion = flipper_pose(self._geometry, flipper, *angles_rad[2 * number : 2 * number + 2])
@@ -147,3 +174,12 @@ def status(level: int, name: str, text: str, values: Mapping[str, Any]) -> Any:
     shown = {key: value if isinstance(value, str) else f"{value:.6g}" for key, value in values.items()}
     pairs = [make("diagnostic_msgs/KeyValue", *pair) for pair in shown.items()]
     return make("diagnostic_msgs/DiagnosticStatus", level, name, text, "mudskipper", pairs)
+
+
+def standard_messages_of(source: LiveRows) -> StandardMessages:
+    """Return those of a daemon's robot; its geometry is the default where the configuration is of another version."""
+    try:
+        geometry = parse_configuration(source.configuration_text).geometry
+    except ConfigurationError:
+        geometry = FlipperGeometry()
+    return StandardMessages(geometry, rig_of(source.kinds[TICK_KIND].metadata))

@@ -5,18 +5,14 @@ messages for each viewer and drops the oldest of one that does not read; a viewe
 exist is answered with an error and keeps its other channels.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from time import monotonic_ns, time_ns
-from typing import Any
 
 import foxglove
 from foxglove import Channel, Schema
 
-from command_line.live.standard_messages import ROS, TOPICS, StandardMessages
+from command_line.live.standard_messages import ROS, TOPICS, StandardMessages, standard_messages_of
 from control.geometry import FlipperGeometry
-from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.rows import EVENT, STRIDE, TICK_KIND, rig_of
 from operator_client.live_rows import LiveRow, LiveRows
 
 
@@ -42,9 +38,7 @@ class ViewerServer:
         for kind in source.kinds:
             if kind.topic not in self._channels:
                 self._add_channel(kind.topic, kind.schema_name, kind.definition)
-        self._standard = StandardMessages(
-            geometry_of(source.configuration_text), rig_of(source.kinds[TICK_KIND].metadata)
-        )
+        self._standard = standard_messages_of(source)
         self._server.clear_session()
 
     def take(self, rows: Sequence[LiveRow], lost: int) -> None:
@@ -53,25 +47,8 @@ class ViewerServer:
         for row in rows:
             stamp_ns = offset_ns + round(1e9 * row.stamp_s)
             self._channels[row.kind.topic].log(row.content, log_time=stamp_ns)
-            if row.kind.topic == STRIDE.topic:
-                self._standard.add_stride(row.values)
-            elif row.kind.topic == EVENT.topic:
-                self._standard.add_event(row.values)
-            elif wanted:
-                self._send_standard(row.values, stamp_ns)
-
-    def _send_standard(self, tick: Mapping[str, Any], stamp_ns: int) -> None:
-        if self._standard.is_due(tick["tick"]):
-            for topic, content in self._standard.of_tick(stamp_ns, tick).items():
+            for topic, content in self._standard.of_row(row, stamp_ns, wanted).items():
                 self._channels[topic].log(content, log_time=stamp_ns)
 
     def close(self) -> None:
         self._server.stop()
-
-
-def geometry_of(configuration_text: str) -> FlipperGeometry:
-    """Return the default where the configuration is of another version."""
-    try:
-        return parse_configuration(configuration_text).geometry
-    except ConfigurationError:
-        return FlipperGeometry()
