@@ -83,8 +83,10 @@ def test_forces_and_frames_are_those_of_the_geometry(log: Log, decoded: dict[str
         assert np.median(differences_m) < 1e-4 and differences_m.max() < 0.005
     _, frames = decoded["/tf"][-1]
     parents = {each.child_frame_id: each.header.frame_id for each in frames.transforms}
-    assert parents["base_link"] == "track" and parents["left_flipper"] == "left_edge"
+    assert parents["base_link"] == "odom" and parents["left_flipper"] == "left_edge"
     assert frames.transforms[0].transform.translation.x == chosen["body_x_m"][-1]
+    positions_m = [message.pose.pose.position.x for _, message in decoded["/odom"]]
+    assert np.array_equal(positions_m, chosen["body_x_m"])
 
 
 @pytest.mark.parametrize("flipper", FLIPPERS)
