@@ -61,6 +61,11 @@ def simulate(
         raise usage_error(f"--bus {problem}") from None
     if wanted:
         return _signal(*wanted, folder / "mudskipper.toml")
+    return _simulate_locally(folder, config, ground, seed, "" if bus == SIMULATED else f"--bus {bus}")
+
+
+def _simulate_locally(folder: Path, config: Path | None, ground: peer.Ground, seed: int, named: str) -> int:
+    """Simulate the robot of a configuration, or the usual one, on local buses in this folder."""
     logs = Path("logs").absolute()
     text = configuration_text(folder, logs)
     if config:
@@ -69,7 +74,6 @@ def simulate(
         text = local_copy(text, folder, logs)
     make_buses(folder)
     configuration = parse_configuration(text, config)
-    named = "" if bus == SIMULATED else f"--bus {bus}"
     return peer.simulate(
         configuration,
         ground,

@@ -51,6 +51,17 @@ def geometry_value(text: str) -> tuple[str, float]:
     raise argparse.ArgumentTypeError(f"{text}: must be one of {', '.join(names)} with its value, as in drop_m=0.05")
 
 
+NodeIds = Annotated[
+    tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id, offers="{joint}=")
+]
+PlateFile = Annotated[
+    str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
+]
+GeometryValues = Annotated[
+    tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value)
+]
+
+
 def init(
     file: Annotated[Path, Option("new file; -: print", metavar="file")] = Path("mudskipper.toml"),
     *,
@@ -63,15 +74,9 @@ def init(
     from_bus: Annotated[bool, Option("search its channels for drives, and write what is found")] = False,
     fd: Annotated[bool, Option("with --from-bus: it carries CAN FD")] = False,
     channel: Annotated[tuple[str, ...], Option("such as can0; twice: the left and the right flipper's own")] = (),
-    node: Annotated[
-        tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id, offers="{joint}=")
-    ] = (),
-    plate: Annotated[
-        str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
-    ] = None,
-    set: Annotated[
-        tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value)
-    ] = (),
+    node: NodeIds = (),
+    plate: PlateFile = None,
+    set: GeometryValues = (),
 ) -> int:
     """Ask for what no option gives; without a terminal, or with `defaults`, the default is the answer."""
     if file != PRINTED and file.exists():
@@ -89,25 +94,27 @@ def init(
         robot = robot._replace(interface=interface, channels=_channels(channel, robot.rig, ask))
         found = scan(robot, fd, drive) if from_bus else {}
         for each_channel, drives in found.items():
-            print(
-                f"found on {each_channel}: {', '.join(f'{each.type} {each.node_id}' for each in drives)}",
-                file=sys.stderr,
-            )
+            names = ", ".join(f"{each.type} {each.node_id}" for each in drives)
+            print(f"found on {each_channel}: {names}", file=sys.stderr)
         robot = with_found(robot, found, dict(node)) if found else robot
         robot = robot._replace(node_ids=_node_ids(dict(node), robot, ask))
         robot = with_identities(robot, found) if found else robot
         text = new_file(robot._replace(geometry=_geometry(plate, dict(set), ask)))
     except EOFError:
         return exit_codes.INTERRUPTED
+    _write(file, text)
+    return exit_codes.OK
+
+
+def _write(file: Path, text: str) -> None:
     parse_configuration(text)
     if file == PRINTED:
         print(text, end="")
-        return exit_codes.OK
+        return
     with file.open("x", encoding="utf-8") as opened:
         opened.write(text)
     print(f"written  {file}\ncheck it with: mudskipper doctor --config {file}")
     print(f"try it without its drives: mudskipper simulate --config {file} --local")
-    return exit_codes.OK
 
 
 class Ask(Protocol):

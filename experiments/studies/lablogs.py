@@ -39,19 +39,21 @@ Groups = Annotated[
 ]
 
 
+VerticalAxis = Annotated[CaptureAxis, Option("axis of a CSV log's motion capture that points up", metavar="AXIS")]
+SurfaceError = Annotated[
+    float | None,
+    Option("standard error of the mud's height (default: 5 for walks, else 1)", low=0.1, high=50, unit="mm"),
+]
+
+
 def study(
     trials: Trials,
     folders: Annotated[tuple[Path, ...], Option("with logs: .csv, .csv.gz or .mcap", metavar="DIR")],
     *,
     group: Groups = (),
     air: Annotated[tuple[str, ...], Option("logs without mud (default: detected)", metavar="PATTERN")] = (),
-    vertical: Annotated[
-        CaptureAxis, Option("axis of a CSV log's motion capture that points up", metavar="AXIS")
-    ] = VERTICAL_AXIS,
-    surface_error: Annotated[
-        float | None,
-        Option("standard error of the mud's height (default: 5 for walks, else 1)", low=0.1, high=50, unit="mm"),
-    ] = None,
+    vertical: VerticalAxis = VERTICAL_AXIS,
+    surface_error: SurfaceError = None,
 ) -> Result:
     """Real logs: do estimates repeat as they claim?
 

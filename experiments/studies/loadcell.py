@@ -48,6 +48,7 @@ def parse_plate(text: str) -> Plate:
     return width, height, thickness
 
 
+Port = Annotated[str | None, Option("of the cell's amplifier; /dev/serial/by-id/... does not change", metavar="PATH")]
 Baud = Annotated[int, Option("of its port", low=300, high=4_000_000)]
 
 
@@ -63,9 +64,7 @@ PositionPort = Annotated[
 def study(
     session: Session,
     *,
-    port: Annotated[
-        str | None, Option("of the cell's amplifier; /dev/serial/by-id/... does not change", metavar="PATH")
-    ] = None,
+    port: Port = None,
     baud: Baud = 115200,
     format: Annotated[str, Option("of its lines: auto, number, indicator, column2, or a pattern")] = AUTO,
     unit: Annotated[str, Option("of its numbers: counts, g, kg, N ... (default: that of the lines)", metavar="U")] = "",
@@ -90,13 +89,8 @@ def study(
     if session.simulated:
         port, position = None, position if position is None else ""
         position_step = position_step or SIMULATED_STEP_UM
-    elif port is None:
-        raise OptionError("name the serial port of the load cell with --port, or use --simulated or --practise")
-    try:
-        _check_lines(format, unit)
-        muds = _checked_muds(mud, session.simulated)
-    except ValueError as problem:
-        raise OptionError(str(problem)) from problem
+    muds = mud or (SIMULATED_MUDS if session.simulated else UNNAMED)
+    _check_names(port, format, unit, muds, session.simulated)
     cell = CellSettings(
         port=port,
         baud=baud,
@@ -109,25 +103,24 @@ def study(
         practises=practise,
     )
     plan = TrialPlan(muds, trials, _stage_settings(plate, depth, speed), depth_error / 1000.0)
-    result = _run(session, plan, cell, {} if compare is None else load_flipper(compare))
+    result = _run(session, plan, cell, load_flipper(compare) if compare else {})
     return replace(result, title=f"{result.title} (practised)") if practise else result
 
 
-def _check_lines(format_name: str, unit: str) -> None:
-    if format_name != AUTO:
-        LineFormat(format_name)
+def _check_names(port: str | None, format_name: str, unit: str, muds: tuple[str, ...], simulated: bool) -> None:
+    if port is None and not simulated:
+        raise OptionError("name the serial port of the load cell with --port, or use --simulated or --practise")
     if unit and unit.lower() not in UNITS:
-        raise ValueError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
-
-
-def _checked_muds(muds: tuple[str, ...], simulated: bool) -> tuple[str, ...]:
-    muds = muds or (SIMULATED_MUDS if simulated else UNNAMED)
+        raise OptionError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
     if len({mud.lower() for mud in muds}) < len(muds):
-        raise ValueError("two muds have the same name")
-    if simulated:
-        for mud in muds:
+        raise OptionError("two muds have the same name")
+    try:
+        if format_name != AUTO:
+            LineFormat(format_name)
+        for mud in muds if simulated else ():
             water_of(mud)
-    return muds
+    except ValueError as problem:
+        raise OptionError(str(problem)) from problem
 
 
 def _stage_settings(plate_cm: Plate, depth_cm: float, speed_m_s: float) -> StageSettings:
