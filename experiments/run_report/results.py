@@ -21,6 +21,7 @@ from pandas import DataFrame
 
 from control.faults import FAULT_KINDS, Reaction
 from control.records import UNKNOWN
+from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
@@ -30,6 +31,7 @@ from experiments.reports.depth_law import fit_depth_law, law_finding
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
+from firmware_host.operator.reports import law_report
 from firmware_host.trial import KEYS, Trial
 from logs.fault_history import LoggedCause
 from logs.files.log_summary import trial_of
@@ -88,6 +90,8 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
     depths_m = [depth_m for depth_m in strides["depth_m"] if isfinite(depth_m)] or [UNKNOWN]
     estimates = run.estimates[run.estimates["mud"] == mud]
     by_flipper = {flipper: estimates[estimates["flipper"] == flipper] for flipper in run.replay.flippers}
+    values = estimates[estimates["valid"] & ~estimates["at_least"]]
+    law = _ground_law(run, values)
     return {
         "mud": mud,
         "strides": len(strides),
@@ -96,7 +100,8 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
         "shallowest_m": min(depths_m),
         "deepest_m": max(depths_m),
         "both": _gathered(estimates),
-        "findings": _law_findings(estimates),
+        "law": law_report(law),
+        "findings": [*_depth_findings(values), *ground_finding(law)],
         "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
     }
 
@@ -121,9 +126,24 @@ def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
     return {name: gather_coefficient(estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS}
 
 
-def _law_findings(estimates: DataFrame) -> list[str]:
+def _ground_law(run: Run, values: DataFrame) -> LawEvidence | None:
+    """Return which ground's law the medians of a mud's strides follow."""
+    medians = values.groupby("coefficient")[["value", "depth_m"]].median()
+    readings = {str(name): (float(row["value"]), float(row["depth_m"])) for name, row in medians.iterrows()}
+    return law_evidence(run.walks[0].geometry, readings) if run.walks else None
+
+
+def ground_finding(law: LawEvidence | None) -> list[str]:
+    """Return a sentence where the coefficients of a ground do not compare as those of mud."""
+    if law is None or law.name == "mud":
+        return []
+    wrong = " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law.errors.items())
+    finding = "no known law explains" if law.name == UNDECIDED else f"the law of {law.name} explains"
+    return [f"{finding} how k_p, k_s and k_e compare: each is predicted wrong from the other two, as {wrong}."]
+
+
+def _depth_findings(values: DataFrame) -> list[str]:
     """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, do not."""
-    values = estimates[estimates["valid"] & ~estimates["at_least"]]
     findings = [law_finding(name, fit_depth_law(values[values["coefficient"] == name])) for name in COEFFICIENTS]
     return [finding for finding in findings if finding]
 

@@ -124,7 +124,7 @@ class OperatorCalls:
             "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
             "stride_supply_min_v": self._stride_supply_v(),
-            "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
+            "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig, loop.configuration.geometry),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
             "trial": self._trials.present,

@@ -12,6 +12,7 @@ from pandas import DataFrame
 
 from control.faults import Reaction
 from control.modes import Mode
+from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.pictures.stride_choice import Outcome
@@ -19,6 +20,7 @@ from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
     differences,
+    ground_finding,
     headline_of,
     is_shown,
     reaction_of,
@@ -190,3 +192,9 @@ def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_r
     assert [*run_labels(runs, headlines).values()] == labels
     rows = comparison_result(runs, headlines).tables[0].rows
     assert list(rows["run"]) == labels
+
+
+def test_a_ground_that_does_not_keep_the_law_of_mud_is_a_finding() -> None:
+    errors = {"mud": 2.0, "sand": 0.1}
+    assert ground_finding(None) == ground_finding(LawEvidence("mud", errors)) == []
+    assert len(ground_finding(LawEvidence("sand", errors))) == len(ground_finding(LawEvidence(UNDECIDED, errors))) == 1
