@@ -5,19 +5,20 @@ wants none. The limits decide which torques leave for the drives (control/limits
 """
 
 from collections.abc import Callable, Sequence
-from math import radians
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
 from control.gait.gait import Gait
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
+from control.gait.stride_table import stride_duration_s, swing_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import VelocityPrediction, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
 from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
 from control.records import (
@@ -51,6 +52,7 @@ class WalkOrder(NamedTuple):
     adaptive: bool = True
     strides: int = 0  # 0: until a stop is requested
     depths_m: tuple[float, ...] = ()  # of the strides in turn, which show how a mud changes with depth; or none
+    gait: GaitParameters | GaitPath | None = None  # None: as configured
 
     def depth_of(self, stride: int) -> float:
         """Return the depth of a stride of a walk that does not adapt."""
@@ -90,6 +92,7 @@ class Controller:
         self._asked = asked
         self._flippers = len(rig.flippers)
         self.gait = Gait(gait, geometry)
+        self._later: Gait | None = None  # of the right flipper, where it follows the left one's gait later
         self.geometry = geometry
         self.gains = gains
         self.mass = mass
@@ -235,8 +238,8 @@ class Controller:
             # flippers that the mud kept from rising stay where they are, or they would pull at it at full torque
             self._pose = self._pose if self._mode is Mode.STOPPING and self._up else still(here)
         elif mode is Mode.WALKING:
+            self._begin_gait()
             self._path = self._path_to_start(here)
-            self.gait.reset(self.order.depth_m)
         elif mode is Mode.STOPPING:
             self._path = JointPath(here, [self._raised(here)], self.motion.path_speed_rad_s)
             self._up, self._waited_s = False, 0.0
@@ -248,9 +251,22 @@ class Controller:
         """Return the pose with level arms, in which the lower edge is H - h above the mud."""
         return Joints(*(value for sweep_rad, _ in angles.flippers for value in (sweep_rad, 0.0)))
 
+    def _begin_gait(self) -> None:
+        depth_m, gait = self.order.depth_m, self.order.gait
+        self.gait.reset(depth_m, gait)
+        self._later = None
+        if gait is None:
+            return
+        self.recovery.reset(swing_duration_s(gait, self.geometry))
+        if isinstance(gait, GaitPath) and gait.right_offset_fraction and self._flippers > 1:
+            self._later = Gait(self.gait.parameters, self.geometry)
+            late_s = gait.right_offset_fraction * stride_duration_s(gait, self.geometry, depth_m)
+            self._later.reset(depth_m, gait, late_s)
+
     def _path_to_start(self, here: JointAngles) -> JointPath:
-        front = radians(self.gait.parameters.sweep_angle_deg)
-        way_points = [self._raised(here), same_for_each(front, 0.0, self.rig)]
+        sweep_rad, depth_m = self.gait.start
+        up_rad = self.geometry.adduction_rad(sweep_rad, depth_m) if self.gait.path else 0.0  # 0: without rounding
+        way_points = [self._raised(here), same_for_each(sweep_rad, up_rad, self.rig)]
         return JointPath(here, way_points, self.motion.path_speed_rad_s)
 
     def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
@@ -271,6 +287,8 @@ class Controller:
 
     def _gait_targets(self, dt_s: float, states: DriveStates) -> JointTargets:
         """Return the gait's targets, or those of the recovery while flippers are stuck before the swing."""
+        if self._later is not None:
+            return self._targets_apart(dt_s, states, self._later)
         stuck = self.recovery.stuck(states) if self.gait.swing_is_next else ()
         self.target = self.gait.step(dt_s, may_swing=not stuck)
         waits_for = stuck if self.gait.waits else ()
@@ -278,6 +296,24 @@ class Controller:
         if self.recovery.attempt:
             self.target = self.target._replace(phase=Phase.RECOVERY)
         return targets
+
+    def _targets_apart(self, dt_s: float, states: DriveStates, later: Gait) -> JointTargets:
+        """Return the targets of flippers at different points of the gait: all stand still while one is stuck."""
+        gaits = dict(zip(self.rig.flippers, (self.gait, later), strict=True))
+        stuck = [flipper for flipper in self.recovery.stuck(states) if gaits[flipper].swing_is_next]
+        stands = any(gaits[flipper].waits for flipper in stuck)
+        targets = [
+            gait.step(0.0 if stands and flipper not in stuck else dt_s, flipper not in stuck)
+            for flipper, gait in gaits.items()
+        ]
+        later.next_depth_m, self.target = self.gait.next_depth_m, targets[0]._replace(phase=Phase.STROKE)
+        wanted: JointTargets = Joints(*(joint for target in targets for joint in self._follow(target)[:2]))
+        waits_for = [flipper for flipper in stuck if gaits[flipper].waits]
+        at_work = [flipper for flipper in gaits if flipper not in waits_for]
+        joints = self.recovery.step(dt_s, waits_for, states, wanted, at_work)
+        if self.recovery.attempt:
+            self.target = self.target._replace(phase=Phase.RECOVERY)
+        return joints
 
     def _follow(self, target: GaitTarget) -> JointTargets:
         """Return the joint targets of a gait target, the same for all flippers."""

@@ -189,7 +189,8 @@ class Loop:
         self.events.report_mode_change(now_s, self.mode, mode, self.fault, self.health.rested, flippers_up)
         if mode is Mode.WALKING:
             self.events.report_learning(now_s, self.learning.finish())
-            self.learning.reset(self.controller.order.depth_m)
+            order = self.controller.order
+            self.learning.reset(order.depth_m, order.gait if isinstance(order.gait, GaitParameters) else None)
         if mode is Mode.ARMING:
             self._clearing_until_s = NEVER_S  # a request to clear does not apply to faults from here on
             self.drives.arm(now_s, at_once=True)
@@ -308,7 +309,9 @@ class Loop:
             return "the daemon is ending"
         if forced and not set(forced.split(",")) <= set(OVERRULED_BY_FORCE):
             return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
-        deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
+        gait = (order and order.gait) or self.configuration.gait
+        parameters = gait if isinstance(gait, GaitParameters) else self.configuration.gait
+        deepest_m = self.configuration.geometry.deepest_m(parameters.sweep_angle_deg)
         for depth_m in () if order is None else order.depths_m or (order.depth_m,):
             if not 0.0 < depth_m <= deepest_m:
                 return f"depth {100.0 * depth_m:g} cm: out of the flippers' reach over the sweep"

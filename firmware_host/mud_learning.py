@@ -13,7 +13,7 @@ one before.
 """
 
 from collections.abc import Callable, Sequence
-from math import inf
+from math import hypot, inf, isfinite
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work
@@ -25,6 +25,7 @@ from control.faults import Fault, FaultKind
 from control.geometry import FlipperGeometry
 from control.parameters.adaptation_parameters import AdaptationParameters, Method
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPhase
 from control.records import NO_LOAD, UNKNOWN, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator
 from estimation.stride_clock import STROKES
@@ -72,10 +73,9 @@ class MudLearning:
             configuration.adaptation.body_drag_n,
             configuration.rig,
         )
-        method = METHODS[configuration.adaptation.method]
-        self.adaptation = method(
-            configuration.adaptation, configuration.geometry, configuration.gait, configuration.rig
-        )
+        self._configuration = configuration
+        self._gait = configuration.gait
+        self.adaptation = self._adaptation()
         self.loads: tuple[FlipperLoad, ...] = tuple(NO_LOAD for _ in configuration.rig.flippers)
         self.units_per_tick = UNITS_PER_TICK
         self.strides: list[ClosedStride] = []
@@ -90,8 +90,20 @@ class MudLearning:
         self._rig = configuration.rig
         self._lowest_v = [inf] * len(configuration.rig.joints)  # since the last stride closed
 
-    def reset(self, depth_m: float) -> None:
-        """Start a new walk. Earlier strides stay stored; unfinished work is dropped, so call `finish` before."""
+    def _adaptation(self) -> Adaptation:
+        configuration = self._configuration
+        method = METHODS[configuration.adaptation.method]
+        return method(configuration.adaptation, configuration.geometry, self._gait, configuration.rig)
+
+    def reset(self, depth_m: float, gait: GaitParameters | None = None) -> None:
+        """Start a new walk with this gait or the configured one; earlier strides stay stored.
+
+        Unfinished work is dropped, so call `finish` before.
+        """
+        gait = gait or self._configuration.gait
+        if gait != self._gait:
+            self._gait = gait
+            self.adaptation = self._adaptation()
         self.estimator.reset()
         self.adaptation.reset(depth_m)
         self.depth_reason = "start"
@@ -112,7 +124,13 @@ class MudLearning:
         if closing is not None:
             work = self._close(closing, controller, controller.order, controller.gait.commanded_depth_m)
             self.estimator.work.add(work)
-        if self._is_firm(controller) and controller.gait.end_insertion():
+        conditions = controller.gait.conditions
+        if conditions is not None:
+            if self._lasts(self._meets(conditions)) and controller.gait.end_phase():
+                self._firm_ticks = 0
+                depth_m = controller.target.depth_m
+                self._messages.append(f"{conditions.name} ended at {depth_m:.4f} m, as its gait says")
+        elif self._is_firm(controller) and controller.gait.end_phase():
             self._messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: solid mud")
 
     def step(self, controller: Controller, within_s: float) -> LearningReport:
@@ -181,9 +199,19 @@ class MudLearning:
             self._firm_ticks = 0
             return False
         limit_nm = self.adaptation.largest_insertion_nm
-        firm = any([load.adduction_torque_nm > limit_nm for load in self.loads])
+        return self._lasts(any([load.adduction_torque_nm > limit_nm for load in self.loads]))
+
+    def _lasts(self, firm: bool) -> bool:
         self._firm_ticks = self._firm_ticks + 1 if firm else 0
         return self._firm_ticks >= FIRM_TICKS
+
+    def _meets(self, conditions: GaitPhase) -> bool:
+        """Return whether a flipper meets a condition that ends its phase early."""
+        force_n, depth_m = conditions.until_force_n, conditions.until_depth_m
+        return any(
+            (force_n is not None and _force_n(load) >= force_n) or (depth_m is not None and load.depth_m >= depth_m)
+            for load in self.loads
+        )
 
     def pop_faults(self) -> list[Fault]:
         """Return faults of the strides that closed since the last call: coefficients beyond what any mud has."""
@@ -192,6 +220,11 @@ class MudLearning:
         strides, self._unexamined = self._unexamined, []
         wild = [stride for stride in strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
         return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]
+
+
+def _force_n(load: FlipperLoad) -> float:
+    """Return the force of the mud on a flipper, in a stance only its forward part."""
+    return hypot(load.force_x_n, load.force_z_n) if isfinite(load.force_z_n) else abs(load.force_x_n)
 
 
 def _lowest_v(voltages_v: Sequence[float]) -> float:

@@ -29,7 +29,7 @@ from typing import NamedTuple, Protocol
 from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
-from control.gait.gait import stride_duration_s
+from control.gait.stride_table import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters

@@ -22,7 +22,7 @@ from math import floor
 
 from control.computing.bounded_work import Work
 from control.depth.depth_choice import Candidate, DepthAdaptation, DepthChoice, depth_grid, make_candidate
-from control.gait.gait import swing_duration_s
+from control.gait.stride_table import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters

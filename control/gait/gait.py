@@ -1,39 +1,19 @@
-"""The crutching gait (paper, section II-A): insertion, stance, extraction, swing, as a table of phases.
+"""The engine that runs a stride's table (stride_table.py): it owns the phase and the time in the stride.
 
-Both flippers follow the same target. The edge goes down at the front of the sweep, holds its depth through the
-stance while the flipper sweeps back, comes up at the back and swings forward above the mud. A phase's duration is
-its path length over its speed, as in the authors' controller, so stride times equal theirs; within a phase the
-speed rises and falls as half a cosine, so joint velocities are continuous and zero where phases meet (except for an
-insertion that ends early, which stops within a tick).
+Within a row the speed rises and falls as half a cosine, so joint velocities are continuous and zero where rows meet
+(except for a phase that ends early, which stops within a tick).
 """
 
 from math import cos, fsum, pi, radians, sin
 from typing import NamedTuple
 
+from control.gait.stride_table import stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath, GaitPhase
 from control.records import GaitTarget, Phase
 
 RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase
-
-# Section II-B of the paper's experiments with a fixed base: slow everywhere, the mud relaxes between phases.
-SINGLE_FLIPPER = GaitParameters(
-    stance_speed_m_s=0.1, extraction_speed_m_s=0.1, swing_speed_m_s=0.1, swing_duration_s=0.0, pause_s=3.0
-)
-# A walk that measures k_e. The quick extraction of `walking` (89 ms at 3 cm) spends more torque on accelerating the arm
-# than on the mud. Right after a stance the sweep lags and catches up in the extraction, which takes less torque at
-# first (docs/explanation/accuracy.md).
-MEASURING = GaitParameters(extraction_speed_m_s=0.2, pause_s=0.5)
-PROTOCOLS = {"walking": GaitParameters(), "measuring": MEASURING, "single_flipper": SINGLE_FLIPPER}
-
-
-class PhaseRow(NamedTuple):
-    phase: Phase
-    duration_s: float
-    sweep_start_rad: float
-    sweep_end_rad: float
-    depth_start_m: float
-    depth_end_m: float
 
 
 class Turn(NamedTuple):
@@ -46,41 +26,6 @@ class Turn(NamedTuple):
         """Return the angle and velocity that it adds to a swing of `duration_s`."""
         fraction, rate = smooth_progress(time_s - self.start_s, duration_s - self.start_s)
         return self.span_rad * fraction, self.span_rad * rate
-
-
-def stride_table(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
-    """Return the phases of one stride at `depth_m` below the nominal surface, in time order."""
-    front = radians(gait.sweep_angle_deg)
-    raised_m = -geometry.clearance_m
-    travel_m = depth_m - raised_m
-    stance_s = _arc_m(gait, geometry) / gait.stance_speed_m_s
-    rows = (
-        PhaseRow(Phase.INSERTION, travel_m / gait.insertion_speed_m_s, front, front, raised_m, depth_m),
-        PhaseRow(Phase.PAUSE, gait.pause_s, front, front, depth_m, depth_m),
-        PhaseRow(Phase.STANCE, stance_s, front, -front, depth_m, depth_m),
-        PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, depth_m, depth_m),
-        PhaseRow(Phase.EXTRACTION, travel_m / gait.extraction_speed_m_s, -front, -front, depth_m, raised_m),
-        PhaseRow(Phase.PAUSE, gait.pause_s, -front, -front, raised_m, raised_m),
-        PhaseRow(Phase.SWING, swing_duration_s(gait, geometry), -front, front, raised_m, raised_m),
-    )
-    return tuple(row for row in rows if row.duration_s > 0.0)
-
-
-def swing_duration_s(gait: GaitParameters, geometry: FlipperGeometry) -> float:
-    return gait.swing_duration_s or _arc_m(gait, geometry) / gait.swing_speed_m_s
-
-
-def _arc_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
-    return 2.0 * radians(gait.sweep_angle_deg) * geometry.flipper_length_m
-
-
-def full_step_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
-    """Return the body's step in one stride if the plates stand still in the mud."""
-    return 2.0 * geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
-
-
-def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> float:
-    return fsum(row.duration_s for row in stride_table(gait, geometry, depth_m))
 
 
 def smooth_progress(time_s: float, duration_s: float) -> tuple[float, float]:
@@ -111,40 +56,51 @@ def _first_half(time_s: float, ramp_s: float, rate: float) -> tuple[float, float
 class Gait:
     """Owns the phase and the time in the stride.
 
-    The depth of the next stride may be set until its insertion begins. Its gait may be set until half of the preceding
-    swing is over, because that swing ends at the angle where the next stride's sweep begins; after that it applies to
-    the stride after the next one.
+    The depth of the next stride may be set until its insertion begins. Its parameters may be set until half of the
+    preceding swing is over, because that swing ends at the angle where the next stride's sweep begins; after that they
+    apply to the stride after the next one. A gait from a file has a path instead, which stays.
     """
 
     def __init__(self, parameters: GaitParameters, geometry: FlipperGeometry) -> None:
-        self.parameters = parameters
+        self._configured = parameters
         self.geometry = geometry
         self.reset(0.0)
 
-    def reset(self, depth_m: float) -> None:
-        """Return to the start of stride 0, at `depth_m` and with the gait's own parameters."""
+    def reset(self, depth_m: float, gait: GaitParameters | GaitPath | None = None, late_s: float = 0.0) -> None:
+        """Return to the start of stride 0, at `depth_m`, with this gait or the configured one, `late_s` later."""
+        self.path = gait if isinstance(gait, GaitPath) else None
+        self.parameters = gait if isinstance(gait, GaitParameters) else self._configured
         self.next_depth_m = depth_m
         self.next_parameters = self._aim = self.parameters
         self.stride = 0
         self._begin_stride()
+        self._time_s = -late_s
 
     def _begin_stride(self) -> None:
         """Begin a stride no deeper than its sweep allows: the depth may have been chosen for another sweep."""
-        depth_m = min(self.next_depth_m, self.geometry.deepest_m(self._aim.sweep_angle_deg))
-        self._rows = stride_table(self._aim, self.geometry, depth_m)
+        depth_m = self.next_depth_m
+        if self.path is None:
+            depth_m = min(depth_m, self.geometry.deepest_m(self._aim.sweep_angle_deg))
+        self._tabulate(depth_m)
         self._row = 0
         self._time_s = 0.0
         self._turns: tuple[Turn, ...] = ()
+        self._gap = (0.0, 0.0)  # in sweep and depth, that a phase which ended early leaves to the next row
+
+    def _tabulate(self, depth_m: float) -> None:
+        self.commanded_depth_m = depth_m  # of the stride under way
+        self._rows = stride_table(self.path or self._aim, self.geometry, depth_m)
+        self._before_swing = next(i for i, row in enumerate(self._rows) if row.phase is Phase.SWING) - 1
 
     @property
-    def commanded_depth_m(self) -> float:
-        """The insertion depth of the stride under way."""
-        return self._rows[0].depth_end_m
+    def start(self) -> tuple[float, float]:
+        """Sweep and depth at which the stride begins."""
+        return self._rows[0].sweep_start_rad, self._rows[0].depth_start_m
 
     @property
     def swing_is_next(self) -> bool:
-        """The swing follows the phase under way, in which the flippers come out of the mud."""
-        return self._row == len(self._rows) - 2
+        """The swing follows the row under way, in which the flippers come out of the mud."""
+        return self._row == self._before_swing
 
     def is_choice_due(self, within_s: float, may_turn: bool) -> bool:
         """Return whether the next stride's depth must be set within this time, because the swing ends then.
@@ -162,6 +118,14 @@ class Gait:
         """The phase before swing is over, and swing may not begin yet."""
         return self.swing_is_next and self._time_s >= self._rows[self._row].duration_s
 
+    @property
+    def conditions(self) -> GaitPhase | None:
+        """The phase under way, where a force or a depth may end it early."""
+        if self.path is None:
+            return None
+        phase = self.path.phase[self._rows[self._row].number]
+        return None if phase.until_force_n is None and phase.until_depth_m is None else phase
+
     def step(self, dt_s: float, may_swing: bool = True) -> GaitTarget:
         """Advance by `dt_s`, but not into a swing that may not begin yet.
 
@@ -177,13 +141,22 @@ class Gait:
             self._end_row()
         return self._target()
 
-    def end_insertion(self) -> bool:
-        """End the insertion at the depth commanded now, if that is in the mud; return whether it ended."""
-        depth_m = self._target().depth_m
-        if self._rows[self._row].phase is not Phase.INSERTION or depth_m <= 0.0:
+    def end_phase(self) -> bool:
+        """End the phase where it is, an insertion only in the mud; return whether it ended.
+
+        The stride continues at the depth that its insertion reached. The next row begins where this one ended.
+        """
+        here, row = self._target(), self._rows[self._row]
+        inserts = self.path.phase[row.number].name == "insertion" if self.path else row.phase is Phase.INSERTION
+        may_end = here.depth_m > 0.0 if inserts else self.path is not None
+        if not may_end:
             return False
-        self._rows = stride_table(self._aim, self.geometry, depth_m)
-        self._row, self._time_s = 1, 0.0
+        if inserts:
+            self._tabulate(here.depth_m)
+        self._row = next(i for i, each in enumerate(self._rows) if each.number > row.number)
+        self._time_s = 0.0
+        begin = self._rows[self._row]
+        self._gap = (here.sweep_rad - begin.sweep_start_rad, here.depth_m - begin.depth_start_m)
         return True
 
     def _turn(self) -> None:
@@ -197,25 +170,23 @@ class Gait:
     def _end_row(self) -> None:
         left_over_s = self._time_s - self._rows[self._row].duration_s
         self._row += 1
+        self._gap = (0.0, 0.0)
         if self._row == len(self._rows):
             self.stride += 1
             self._begin_stride()
         self._time_s = left_over_s
 
     def _target(self) -> GaitTarget:
-        phase, duration_s, sweep_start, sweep_end, depth_start, depth_end = self._rows[self._row]
-        fraction, rate = smooth_progress(self._time_s, duration_s)
-        sweep_span, depth_span = sweep_end - sweep_start, depth_end - depth_start
-        sweep_rad, sweep_rad_s = sweep_start + sweep_span * fraction, sweep_span * rate
+        row = self._rows[self._row]
+        fraction, rate = smooth_progress(self._time_s, row.duration_s)
+        sweep_rad, depth_m, sweep_rate, depth_rate = row.at(fraction)
+        sweep_rad_s, depth_m_s = sweep_rate * rate, depth_rate * rate
         if self._turns:
-            added = [turn.after(self._time_s, duration_s) for turn in self._turns]
+            added = [turn.after(self._time_s, row.duration_s) for turn in self._turns]
             sweep_rad += fsum(angle_rad for angle_rad, _ in added)
             sweep_rad_s += fsum(velocity_rad_s for _, velocity_rad_s in added)
-        return GaitTarget(
-            phase,
-            self.stride,
-            sweep_rad,
-            sweep_rad_s,
-            depth_start + depth_span * fraction,
-            depth_span * rate,
-        )
+        sweep_gap_rad, depth_gap_m = self._gap
+        if sweep_gap_rad or depth_gap_m:
+            sweep_rad, depth_m = sweep_rad + sweep_gap_rad * (1.0 - fraction), depth_m + depth_gap_m * (1.0 - fraction)
+            sweep_rad_s, depth_m_s = sweep_rad_s - sweep_gap_rad * rate, depth_m_s - depth_gap_m * rate
+        return GaitTarget(row.phase, self.stride, sweep_rad, sweep_rad_s, depth_m, depth_m_s)

@@ -27,8 +27,9 @@ from collections.abc import Sequence
 from math import copysign, cos, fsum, radians, sin
 from typing import NamedTuple
 
-from control.gait.gait import RAMP_S, swing_duration_s
+from control.gait.gait import RAMP_S
 from control.gait.joint_path import still
+from control.gait.stride_table import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange, clip
 from control.parameters.gait_parameters import GaitParameters
@@ -92,11 +93,13 @@ class Recovery:
         self.geometry = geometry
         self._ranges = ranges
         self._sweep_range, self._adduction_range = ranges.flippers[0]  # the same for all flippers
-        swing_s = swing_duration_s(gait, geometry)
-        self._fade_s = same_for_each(swing_s, min(RISE_S, swing_s), rig)
+        self._quickest_s = swing_duration_s(gait, geometry)
         self.reset()
 
-    def reset(self) -> None:
+    def reset(self, swing_s: float | None = None) -> None:
+        """Forget the attempts; `swing_s` is the duration of the swings that follow, if it is not the configured one."""
+        swing_s = self._quickest_s if swing_s is None else swing_s
+        self._fade_s = same_for_each(swing_s, min(RISE_S, swing_s), self.rig)
         self.attempt = 0  # under way; 0: none
         self.given_up: Sequence[str] = ()  # flippers that the last attempt has not freed
         self.events = ""  # of this step, for the log
@@ -116,8 +119,15 @@ class Recovery:
             if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad)
         )
 
-    def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
-        """Return the gait's targets, or those of an attempt while flippers are `stuck`."""
+    def step(
+        self,
+        dt_s: float,
+        stuck: Sequence[str],
+        states: DriveStates,
+        wanted: JointTargets,
+        at_work: Sequence[str] = (),
+    ) -> JointTargets:
+        """Return the gait's targets, or those of an attempt while flippers are `stuck`; those `at_work` stay there."""
         self.events = ""
         if self._waits is not bool(stuck):
             self._waits, self._time_s = bool(stuck), 0.0
@@ -128,7 +138,13 @@ class Recovery:
             return self._faded(wanted)
         if self._time_s > self._allowed_s:
             self._begin_attempt(stuck, states)
-        return self._pull(dt_s, stuck, states) if self.attempt else wanted
+        if not self.attempt:
+            return wanted
+        targets = self._pull(dt_s, stuck, states)
+        for joints in map(self.rig.joints_of, at_work):
+            targets = Joints(*targets[: joints.start], *wanted[joints], *targets[joints.stop :])
+        self._targets = targets
+        return targets
 
     @property
     def _allowed_s(self) -> float:
@@ -159,8 +175,7 @@ class Recovery:
         for name, target, state in zip(self.rig.flippers, targets.flippers, states.flippers, strict=True):
             pulled.append(self._ahead(direction, state.sweep.angle_rad) if name in stuck else target.sweep)
             pulled.append(self._raised(step_rad, dt_s, target.adduction, state.adduction.angle_rad))
-        self._targets = Joints(*pulled)
-        return self._targets
+        return Joints(*pulled)
 
     def _ahead(self, direction: float, here_rad: float) -> JointTarget:
         """Return a target far enough ahead for full torque, within the joint's limits."""

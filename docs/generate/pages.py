@@ -11,10 +11,10 @@ from itertools import groupby
 from pathlib import Path
 
 from command_line.init.key_reference import Key, configuration_keys, is_required, toml_value
-from control.gait.gait import PROTOCOLS
 from docs.generate.command_line import commands, exit_statuses
 from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
+from firmware_host.configuration.gait_file import PROTOCOLS
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
 from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, SocketMethod

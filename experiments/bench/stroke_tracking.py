@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from control.controller import WalkOrder
 from control.faults import FaultKind
-from control.gait.gait import stride_duration_s
+from control.gait.stride_table import stride_duration_s
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from control.records import FlipperJoints, JointAngles, Rig, same_for_each

@@ -16,7 +16,6 @@ from random import Random
 from typing import NamedTuple
 
 from control.controller import WalkOrder
-from control.gait.gait import MEASURING, SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.gait_parameters import GaitParameters
@@ -28,6 +27,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import MudEstimator
 from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.gait_file import PROTOCOLS
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.disturbances import Disturbances
@@ -62,9 +62,9 @@ class Setup:
 
 
 # The authors' logs hold 50 to 110 distinct states a second of a single flipper, up to 210 of the walking robot.
-SINGLE = Setup("single flipper", SINGLE_FLIPPER, fixed_base=True, row_period_s=1.0 / 100.0)
+SINGLE = Setup("single flipper", PROTOCOLS["single_flipper"], fixed_base=True, row_period_s=1.0 / 100.0)
 WALKING = Setup("walking", GaitParameters(), fixed_base=False, row_period_s=1.0 / 200.0)
-MEASURING_WALK = replace(WALKING, name="measuring walk", gait=MEASURING)
+MEASURING_WALK = replace(WALKING, name="measuring walk", gait=PROTOCOLS["measuring"])
 
 
 @dataclass(frozen=True)

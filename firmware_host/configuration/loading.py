@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from control.computing.suggestion import suggestion
-from control.gait.gait import PROTOCOLS
 from drivers.can.can_port import interface_problem
 from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.consistency import contradictions, gait_warnings
 from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.gait_file import PROTOCOLS
 from firmware_host.configuration.toml_records import (
     OneOf,
     RecordReader,

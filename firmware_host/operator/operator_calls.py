@@ -14,7 +14,7 @@ from typing import Any
 from control.controller import WalkOrder
 from control.fault_causes import group_by_cause
 from control.faults import Blocks, Fault
-from control.gait.gait import full_step_m
+from control.gait.stride_table import full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.records import JOINTS, UNKNOWN

@@ -5,8 +5,8 @@ from math import inf, nan, radians
 import pytest
 
 from control.controller import DAMPING_NM, DAMPING_S, RAISING_S, RESTING, SETTLED_S, SOFT_STOP_S, Controller, WalkOrder
-from control.gait.gait import stride_duration_s
 from control.gait.recovery import Recovery
+from control.gait.stride_table import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.modes import MOVING, Mode

@@ -14,7 +14,8 @@ from random import Random
 from typing import Any, NamedTuple
 
 from control.computing.bounded_work import finish
-from control.gait.gait import Gait, stride_duration_s
+from control.gait.gait import Gait
+from control.gait.stride_table import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters

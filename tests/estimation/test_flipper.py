@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from control.gait.gait import SINGLE_FLIPPER
 from control.gait.recovery import OUT_M, is_in_mud, lowest_point_m
 from control.joint_friction import JointFriction
 from control.parameters.arm_mass import ArmMass
@@ -29,6 +28,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.stride_estimator import GRACE_S
 from estimation.strokes.shear import Base
 from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
+from firmware_host.configuration.gait_file import PROTOCOLS
 from tests.estimation import synthetic_strides
 from tests.estimation.synthetic_strides import GEOMETRY, RATE_HZ, Moment, Row, strides_of, update, walked
 
@@ -143,7 +143,7 @@ def uncertainties(stride: StrideEstimate) -> list[float]:
 
 
 @pytest.mark.parametrize("drive", [WEIGHTLESS, HEAVY])
-@pytest.mark.parametrize("gait", [GAIT, SINGLE_FLIPPER])
+@pytest.mark.parametrize("gait", [GAIT, PROTOCOLS["single_flipper"]])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04])
 def test_where_the_surface_is_known_shear_and_extraction_are_found(
     depth_m: float, gait: GaitParameters, drive: FlipperDrive
@@ -279,7 +279,7 @@ def test_slow_messages_change_value_and_error_little(ticks: int) -> None:
     """The messages come 190 to 38 times a second. A tenth of the messages has √10 of the noise; with 0.02 A that is
     negligible compared with the torque constants' 3.2 %.
     """
-    rows = noisy(rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY), 3, 0.02)
+    rows = noisy(rows_of(motion(gait=PROTOCOLS["single_flipper"]), MUD, HEAVY), 3, 0.02)
     held = [rows[i - i % ticks]._replace(now_s=row.now_s, phase=row.phase) for i, row in enumerate(rows)]
     plain, seldom = (one(each, estimator(HEAVY)) for each in (rows, held))
     for a, b in zip(coefficients(plain), coefficients(seldom), strict=True):
@@ -305,7 +305,7 @@ def _invalid(row: Row, joint: str, field: str, bad: float) -> Row:
 @pytest.mark.parametrize("lost", [5, 20])
 def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_uncertainty(lost: int) -> None:
     """The gaps last 13 and 52 ms: less and more than LONGEST_GAP_S, up to which two samples belong to one motion."""
-    rows = rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY)
+    rows = rows_of(motion(gait=PROTOCOLS["single_flipper"]), MUD, HEAVY)
     whole = one(rows, estimator(HEAVY))
     gaps = {i for phase in (1, 2, 3) for i in _middle(rows, Phase(phase), lost)}
     pierced = one((row.lost() if i in gaps else row for i, row in enumerate(rows)), estimator(HEAVY))
@@ -326,7 +326,7 @@ def test_one_wild_sample_moves_no_coefficient_out_of_its_interval(phase: Phase, 
     """One sample at a time is wild, all along the stroke. 10 A is the most that the drives give and five times their
     current here. Each sample is in two loads, half-way to its neighbours, and so in two batches where these meet.
     """
-    rows = noisy(rows_of(motion(gait=SINGLE_FLIPPER)), 4)
+    rows = noisy(rows_of(motion(gait=PROTOCOLS["single_flipper"])), 4)
     calm = one(rows)
     for index in [i for i, row in enumerate(rows) if row.phase is phase][3::29]:
         wild = one([*rows[:index], rows[index].pushed(wild_a, wild_a), *rows[index + 1 :]])

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from control.gait.gait import SINGLE_FLIPPER
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
+from firmware_host.configuration.gait_file import PROTOCOLS
 from tests.estimation.synthetic_strides import (
     GAIT,
     GEOMETRY,
@@ -216,7 +216,7 @@ def test_the_law_is_found_from_every_other_sample() -> None:
 # gravity and inertia
 
 
-@pytest.mark.parametrize(("mass", "gait"), [(WEIGHTLESS, SINGLE_FLIPPER), (HEAVY, GAIT)])
+@pytest.mark.parametrize(("mass", "gait"), [(WEIGHTLESS, PROTOCOLS["single_flipper"]), (HEAVY, GAIT)])
 def test_the_law_is_found_through_pauses_and_without_gravity_and_inertia(mass: ArmMass, gait: GaitParameters) -> None:
     assert_found(one(triggered(walked(gait=gait), MUD, mass), estimator(mass)), MUD)
 

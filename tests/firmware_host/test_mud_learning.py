@@ -42,9 +42,10 @@ class FakeGait:
     next_depth_m: float = 0.03
     parameters: GaitParameters = GaitParameters()
     next_parameters: GaitParameters = GaitParameters()
+    conditions: None = None
     ended: int = 0
 
-    def end_insertion(self) -> bool:
+    def end_phase(self) -> bool:
         self.ended += 1
         return self.ended == 1
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from control.controller import DAMPING_S, WalkOrder
-from control.gait.gait import stride_duration_s
+from control.gait.stride_table import stride_duration_s
 from control.modes import Mode, Request
 from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from math import ceil, exp, radians
 
 from control.faults import FAULT_KINDS, FaultKind, Reaction
-from control.gait.gait import stride_duration_s
+from control.gait.stride_table import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.monitors.joint_monitor import FAST_FRACTION
 from control.monitors.motion_monitor import RUNAWAY_LEAK_S, runaway_bound_j

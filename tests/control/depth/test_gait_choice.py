@@ -11,7 +11,8 @@ from control.depth.depth_choice import DepthChoice, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.depth.step_model import Traction, carried_m, motion_of
-from control.gait.gait import Gait, stride_duration_s
+from control.gait.gait import Gait
+from control.gait.stride_table import stride_duration_s
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters

@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait.gait import PROTOCOLS, RAMP_S, SINGLE_FLIPPER, Gait, smooth_progress, stride_duration_s, stride_table
+from control.gait.gait import RAMP_S, Gait, smooth_progress
+from control.gait.stride_table import stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import GaitTarget, Phase
+from firmware_host.configuration.gait_file import PROTOCOLS
 
 GEOMETRY = FlipperGeometry(flipper_length_m=0.12, drop_m=0.05, axis_height_m=0.0645)
 WALKING = GaitParameters()
@@ -47,8 +49,7 @@ def adduction_velocity_rad_s(target: GaitTarget) -> float:
 
 
 def test_the_single_flipper_protocol_is_the_papers() -> None:
-    rows = stride_table(SINGLE_FLIPPER, GEOMETRY, 0.03)
-    assert PROTOCOLS["single_flipper"] is SINGLE_FLIPPER
+    rows = stride_table(PROTOCOLS["single_flipper"], GEOMETRY, 0.03)
     assert [row.duration_s for row in rows if row.phase is Phase.PAUSE] == [3.0, 3.0, 3.0]
     for row in rows:
         path_m = abs(row.depth_end_m - row.depth_start_m) + 0.12 * abs(row.sweep_end_rad - row.sweep_start_rad)
@@ -266,7 +267,7 @@ def test_a_gait_set_late_in_the_swing_is_that_of_the_stride_after_the_next() -> 
 def test_an_insertion_that_ends_early_leaves_the_rest_of_the_stride_at_its_depth() -> None:
     gait = started(0.05)
     before = gait.step(0.4)
-    gait.end_insertion()
+    gait.end_phase()
     after = gait.step(0.0)
     assert (before.phase, after.phase) == (Phase.INSERTION, Phase.STANCE)
     assert after.depth_m == gait.commanded_depth_m == before.depth_m < 0.03
@@ -279,11 +280,11 @@ def test_only_an_insertion_in_the_mud_can_end_early_and_only_that_of_its_own_str
     for until_s, phase in ((0.05, Phase.INSERTION), (0.5, Phase.STANCE)):
         gait = started()
         gait.step(until_s)
-        assert not gait.end_insertion()
+        assert not gait.end_phase()
         assert (gait.step(0.0).phase, gait.commanded_depth_m) == (phase, 0.03)
     gait.reset(0.03)
     gait.step(0.3)
-    gait.end_insertion()
+    gait.end_phase()
     while gait.stride == 0:
         gait.step(0.01)
     assert gait.commanded_depth_m == 0.03

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from control.controller import Controller, WalkOrder
 from control.faults import FaultKind
-from control.gait.gait import PROTOCOLS, stride_duration_s
 from control.gait.joint_path import still
 from control.gait.recovery import AWAY_FRACTION, Recovery, is_in_mud, lowest_point_m
+from control.gait.stride_table import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.modes import Mode
@@ -37,6 +37,7 @@ from control.records import (
     same_for_all,
     same_for_each,
 )
+from firmware_host.configuration.gait_file import PROTOCOLS
 from tests.control.synthetic_states import states_at
 
 DEPTH_M = 0.04
@@ -59,8 +60,15 @@ class Moment(NamedTuple):
 class SeenRecovery(Recovery):
     """A recovery that stores the targets that it gave last."""
 
-    def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
-        self.given = super().step(dt_s, stuck, states, wanted)
+    def step(
+        self,
+        dt_s: float,
+        stuck: Sequence[str],
+        states: DriveStates,
+        wanted: JointTargets,
+        at_work: Sequence[str] = (),
+    ) -> JointTargets:
+        self.given = super().step(dt_s, stuck, states, wanted, at_work)
         return self.given
 
 

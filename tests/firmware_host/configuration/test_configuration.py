@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from control.gait.gait import PROTOCOLS, SINGLE_FLIPPER
 from control.records import JOINTS
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.gait_file import PROTOCOLS
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 from firmware_host.daemon import main
 from simulation.harness.drive_presets import calibrated
@@ -205,7 +205,7 @@ def test_the_bounds_of_faults_are_ordered(lower: str, upper: str, bound: float, 
 def test_a_protocol_is_a_preset_that_other_keys_change(example_text: str) -> None:
     text = example_text.replace('protocol = "walking"', 'protocol = "single_flipper"')
     gait = parse_configuration(text.replace("swing_duration_s = 0.8", "pause_s = 1.0")).gait
-    assert gait.stance_speed_m_s == SINGLE_FLIPPER.stance_speed_m_s == 0.1
+    assert gait.stance_speed_m_s == PROTOCOLS["single_flipper"].stance_speed_m_s == 0.1
     assert gait.pause_s == 1.0
 
 

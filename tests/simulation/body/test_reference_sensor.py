@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from control.controller import WalkOrder
-from control.gait.gait import SINGLE_FLIPPER
 from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.gait_file import PROTOCOLS
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
@@ -188,7 +188,7 @@ def test_a_walk_has_the_strides_that_the_loop_closes_and_in_soft_mud_slip_and_ad
 
 def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:
     lockstep = Lockstep(
-        replace(configuration, gait=replace(SINGLE_FLIPPER, pause_s=0.3)),
+        replace(configuration, gait=replace(PROTOCOLS["single_flipper"], pause_s=0.3)),
         SOFT,
         disturbances=Disturbances(surface_sd_m=0.0015, remoulding=1.0),
         fixed_base=True,

@@ -1,0 +1,42 @@
+"""Reads gait files: TOML with the keys of control/parameters/gait_path.py. The folder `gaits` has those that ship.
+
+On the way to the daemon a gait is the same tables as JSON, on one line and without comments.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from control.gait.stride_table import crutching_parameters
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text
+
+SHIPPED = Path(__file__).parent / "gaits"
+
+_READER = RecordReader(GaitPath)
+
+
+def gait_document(gait: str) -> dict[str, Any]:
+    """Return the tables of a gait: a file, or the name of one that ships. Raises ConfigurationError."""
+    shipped = SHIPPED / f"{gait}.toml"
+    path = shipped if gait.isidentifier() and shipped.exists() else Path(gait)
+    return {"name": path.name} | parse_document(read_text(path), path)
+
+
+def read_gait(document: dict[str, Any]) -> GaitPath:
+    """Return the gait of these tables. Raises ConfigurationError with a message for each wrong key."""
+    try:
+        return GaitPath(**_READER.read(document))
+    except ConfigurationError as problem:
+        name = document.get("name") or "gait"
+        raise ConfigurationError([f"{name}: {each}" for each in problem.problems]) from None
+
+
+def _protocol(name: str) -> GaitParameters:
+    parameters = crutching_parameters(read_gait(gait_document(name)))
+    assert parameters, name
+    return parameters
+
+
+PROTOCOLS = {name: _protocol(name) for name in ("walking", "measuring", "single_flipper")}
