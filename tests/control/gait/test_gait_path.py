@@ -1,0 +1,87 @@
+"""Gaits from files: those that ship against the parameters and the curves that they stand for."""
+
+from itertools import islice, pairwise
+from math import radians
+
+import pytest
+
+from control.gait.gait import Gait
+from control.gait.stride_table import crutching_parameters, stride_duration_s, stride_table
+from control.geometry import FlipperGeometry
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
+from control.rate import PERIOD_S
+from control.records import GaitTarget, Phase
+from firmware_host.configuration.gait_file import PROTOCOLS, SHIPPED, gait_document, read_gait
+
+GEOMETRY = FlipperGeometry()
+NAMES = sorted(path.stem for path in SHIPPED.glob("*.toml"))
+DEPTH_M = 0.03
+
+
+def load(name: str) -> GaitPath:
+    return read_gait(gait_document(name))
+
+
+def started(path: GaitPath | GaitParameters, depth_m: float = DEPTH_M) -> Gait:
+    gait = Gait(GaitParameters(), GEOMETRY)
+    gait.reset(depth_m, path)
+    return gait
+
+
+def targets(gait: Gait, count: int) -> list[GaitTarget]:
+    return [gait.step(PERIOD_S) for _ in range(count)]
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_the_file_of_a_protocol_commands_what_its_parameters_command(name: str) -> None:
+    path, parameters = load(name), PROTOCOLS[name]
+    assert crutching_parameters(path) == parameters
+    count = int(2.2 * stride_duration_s(parameters, GEOMETRY, DEPTH_M) / PERIOD_S)
+    assert targets(started(path), count) == targets(started(parameters), count)
+
+
+def test_only_the_crutching_gait_has_its_parameters() -> None:
+    known = {name for name in NAMES if crutching_parameters(load(name))}
+    assert known == {*PROTOCOLS, "three_depths"}
+    assert load("three_depths").phase == load("measuring").phase
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_gait_jumps_and_velocities_are_the_changes_of_position(name: str) -> None:
+    gait = started(load(name))
+    path = targets(gait, int(2.2 * stride_duration_s(load(name), GEOMETRY, DEPTH_M) / PERIOD_S))
+    assert path[-1].stride >= 1
+    for before, after in pairwise(path):
+        for value, rate in (("sweep_rad", "sweep_velocity_rad_s"), ("depth_m", "depth_velocity_m_s")):
+            mean = (getattr(before, rate) + getattr(after, rate)) / 2.0
+            assert getattr(after, value) - getattr(before, value) == pytest.approx(mean * PERIOD_S, abs=2e-3)
+
+
+def test_an_elliptic_stroke_lies_on_its_ellipse() -> None:
+    stroke = [target for target in targets(started(load("ellipse")), 300) if target.phase is Phase.STROKE]
+    ends_m = -0.5 * GEOMETRY.clearance_m
+    for target in stroke:
+        along, down = target.sweep_rad / radians(35.0), (target.depth_m - ends_m) / (DEPTH_M - ends_m)
+        assert along**2 + down**2 == pytest.approx(1.0)
+    assert max(target.depth_m for target in stroke) == pytest.approx(DEPTH_M, abs=1e-5)
+
+
+def test_the_estimator_sees_the_phases_whose_laws_it_knows() -> None:
+    reported = {name: [row.phase for row in stride_table(load(name), GEOMETRY, DEPTH_M)] for name in NAMES}
+    assert Phase.STROKE not in reported["walking"]
+    assert reported["backward"] == [Phase.INSERTION, Phase.STROKE, Phase.EXTRACTION, Phase.SWING]
+    assert {*reported["alternating"]} == {*reported["ellipse"]} == {Phase.STROKE, Phase.SWING}
+
+
+@pytest.mark.parametrize(("name", "after_s", "depth_m"), [("slow_insertion", 2.0, 0.05), ("ellipse", 0.2, 0.03)])
+def test_a_phase_that_ends_early_is_followed_from_where_it_ended(name: str, after_s: float, depth_m: float) -> None:
+    gait = started(load(name), depth_m)
+    last = targets(gait, int(after_s / PERIOD_S))[-1]
+    assert gait.end_phase()
+    nexts = list(islice(iter(lambda: gait.step(PERIOD_S), None), 100))
+    assert nexts[0].depth_m == pytest.approx(last.depth_m, abs=1e-4)
+    assert nexts[0].sweep_rad == pytest.approx(last.sweep_rad, abs=1e-3)
+    if name == "slow_insertion":  # the stride continues at the depth that was reached
+        assert gait.commanded_depth_m == last.depth_m
+        assert nexts[-1].depth_m == pytest.approx(last.depth_m)
