@@ -99,9 +99,7 @@ def stride_table(gait: GaitParameters | GaitPath, geometry: FlipperGeometry, dep
     for number, phase in enumerate(path.phase):
         legs = list(_legs(number, phase, here, geometry, depth_m))
         here = legs[-1].sweep_end_rad, legs[-1].depth_end_m
-        rows += [
-            row._replace(phase=_reported(phase.name, row, ordered)) for row in _timed(legs, phase, geometry)
-        ]
+        rows += [row._replace(phase=_reported(phase.name, row, ordered)) for row in _timed(legs, phase, geometry)]
     return tuple(rows)
 
 
