@@ -69,7 +69,8 @@ class RosPublisher:
     @property
     def is_wanted(self) -> bool:
         """Return whether somebody has subscribed."""
-        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]  # its stub says bool
+        status: Any = self._publisher.matching_status  # its stub says bool
+        return bool(status.matching)
 
     def publish(self, content: bytes) -> None:
         attachment = ATTACHMENT.pack(next(self._numbers), time.time_ns(), GID_BYTES, self._gid)
