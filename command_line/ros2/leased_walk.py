@@ -16,6 +16,7 @@ from command_line.operation.confirmation import ANSWER_S, end_motion
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 LEASE_S = 2.0
+PAUSE = f"; pause for {LEASE_S:g} s before the next walk"
 
 
 class LeasedWalk:
@@ -36,7 +37,7 @@ class LeasedWalk:
             try:
                 self._begin() if paused else self._continue()
             except (CallRefusedError, NoDaemonError, NotPermittedError) as problem:
-                self._close(str(problem))
+                self._close(f"{str(problem).removesuffix(PAUSE)}{PAUSE}")
                 raise
             return f"walking: call again within {LEASE_S:g} s, or the robot stops"
 
@@ -54,7 +55,7 @@ class LeasedWalk:
             return
         self._release()
         cause = report["notice"] or f"the robot is in mode {report['mode']}"
-        raise CallRefusedError(f"{cause}; the walk has ended: pause for {LEASE_S:g} s before the next one")
+        raise CallRefusedError(f"{cause}{PAUSE}")
 
     def clear(self) -> str:
         """Clear faults, refused while another program has the lease."""
@@ -70,7 +71,7 @@ class LeasedWalk:
                 with suppress(CallRefusedError, NoDaemonError):
                     self._client.call(method)
                     self._release()
-                self._close(f"ended by {method}: pause for {LEASE_S:g} s before the next walk")
+                self._close(f"ended by {method}{PAUSE}")
         ended = end_motion(self._socket, method)
         if ended.status != exit_codes.OK:
             raise CallRefusedError(ended.answer)

@@ -63,7 +63,7 @@ class RosPublisher:
 
     def __init__(self, publisher: zenoh.Publisher, token: str) -> None:
         self._publisher = publisher
-        self._gid = blake2b(token.encode(), digest_size=GID_BYTES).digest()
+        self._gid = blake2b(token.encode(), digest_size=GID_BYTES).digest()  # any one does that is unique
         self._numbers = count(1)
 
     @property

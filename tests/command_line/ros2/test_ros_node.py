@@ -6,7 +6,9 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from threading import Event
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -28,7 +30,7 @@ from control.records import JOINTS
 from firmware_host.log.rows import ROW_KINDS, STRIDE, TICK
 from operator_client.live_rows import LiveRow, LiveRows
 from tests.command_line.command_lines import failure
-from tests.waiting import wait_until
+from tests.waiting import LONGEST_S, wait_until
 
 STRIDE_NAME = "mudskipper_msgs/msg/Stride"
 GID = bytes(range(16))
@@ -158,6 +160,26 @@ def test_a_service_answers_with_the_number_and_the_id_of_the_request(graph: Grap
         assert (own_number, gid) == (number, GID)
     (reply,) = graph.ask(keys["/mudskipper/stop"], 1, attachment=b"too short")
     assert reply.ok is None and b"attachment" in reply.err.payload.to_bytes()
+
+
+def test_a_service_that_takes_long_delays_no_other(graph: Graph) -> None:
+    node, begun, ending = RosNode(graph.own, 0, "", hashed=True), Event(), Event()
+
+    def stop() -> tuple[bool, str]:
+        begun.set()
+        return ending.wait(LONGEST_S), ""
+
+    node.serve("stop", stop)
+    node.serve("disarm", lambda: (True, ""))
+    wait_until(lambda: len(graph.endpoints()) == 3)
+    keys = {endpoint.name: endpoint.key for endpoint in graph.endpoints() if endpoint.name}
+    with ThreadPoolExecutor() as calls:
+        stopped = calls.submit(graph.ask, keys["/mudskipper/stop"], 1)
+        assert begun.wait(LONGEST_S)
+        assert graph.ask(keys["/mudskipper/disarm"], 2)[0].ok
+        assert not stopped.done()
+        ending.set()
+        assert stopped.result()[0].ok
 
 
 def test_nodes_that_do_not_meet_this_one_are_named_once(graph: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
