@@ -190,20 +190,18 @@ class FaultMonitor:
     def _check_joints(
         self, found: list[Fault], tick: Tick, monitor_input: MonitorInput, drives: Joints[DriveHealth]
     ) -> None:
-        mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
         followed = None if monitor_input.freeing else monitor_input.targets  # those of a pull lead
         targets = followed or self._no_targets
-        facts = TickFacts(
-            now_s=tick.now_s,
-            dt_s=(1 + tick.missed) * self._period_s,
-            energised=mode in ENERGISED,
-            moving=mode in MOVING,
-            may_stand_still=monitor_input.freeing or mode not in HELD,
-            damping=mode is Mode.DAMPING,
-        )
+        facts = self._facts(tick, monitor_input)
         stalled = tick.missed * self._period_s > STALL_S
         for joint, zero, health, state, torque_nm, target in zip(
-            self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
+            self.joints,
+            self.zeros,
+            drives,
+            monitor_input.states,
+            monitor_input.sent.torques_nm,
+            targets,
+            strict=True,
         ):
             if stalled and health.restarts == self._restarts[health.joint]:
                 zero.skip_gap(tick.now_s)
@@ -215,6 +213,17 @@ class FaultMonitor:
                     continue
                 explained = fault.kind in EXPLAINED and health.errors
                 found.append(fault.with_values(reason=health.errors) if explained else fault)
+
+    def _facts(self, tick: Tick, monitor_input: MonitorInput) -> TickFacts:
+        mode = monitor_input.mode
+        return TickFacts(
+            now_s=tick.now_s,
+            dt_s=(1 + tick.missed) * self._period_s,
+            energised=mode in ENERGISED,
+            moving=mode in MOVING,
+            may_stand_still=monitor_input.freeing or mode not in HELD,
+            damping=mode is Mode.DAMPING,
+        )
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:
         """Return whether mud may hold a joint that lags behind, or held it until CATCH_UP_S ago.

@@ -101,8 +101,17 @@ class JointMonitor:
         seen_s = facts.dt_s if facts.dt_s <= MOST_SEEN_S else MOST_SEEN_S
         self._watch_signals(found, facts, state)
         self._watch_drive(found, facts, seen_s, state)
+        self._watch_range(found, seen_s, state)
         self._watch_motion(found, facts, seen_s, state, torque_nm, target)
         self._watch_load(found, facts, seen_s, state.current_a, torque_nm)
+        self._watch_heat(found, facts, state, torque_nm)
+        return found
+
+    def update_load(self, facts: TickFacts, state: DriveState, torque_nm: float) -> list[Fault]:
+        """Return the faults of a tick that mud causes where drive, encoder and wires cannot fail."""
+        found: list[Fault] = []
+        self._watch_range(found, facts.dt_s, state)
+        self._watch_load(found, facts, facts.dt_s, state.current_a, torque_nm)
         self._watch_heat(found, facts, state, torque_nm)
         return found
 
@@ -180,15 +189,7 @@ class JointMonitor:
 
     # motion
 
-    def _watch_motion(
-        self,
-        found: list[Fault],
-        facts: TickFacts,
-        seen_s: float,
-        state: DriveState,
-        torque_nm: float,
-        target: JointTarget | None,
-    ) -> None:
+    def _watch_range(self, found: list[Fault], seen_s: float, state: DriveState) -> None:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad, self._low_rad, self._high_rad))
@@ -201,6 +202,16 @@ class JointMonitor:
             found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
         if not self._stillness.update(angle_rad, seen_s):
             self._stalled_s = 0.0
+
+    def _watch_motion(
+        self,
+        found: list[Fault],
+        facts: TickFacts,
+        seen_s: float,
+        state: DriveState,
+        torque_nm: float,
+        target: JointTarget | None,
+    ) -> None:
         if not facts.energised:
             self._encoder.release()
             if self._stillness.still_s < REST_S:

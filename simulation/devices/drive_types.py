@@ -11,7 +11,8 @@ from simulation.devices.odrive.settings import BUILD
 from simulation.devices.odrive05.device import SimulatedOdrive05, join_boards
 from simulation.devices.simulated_drive import SimulatedDrive
 
-SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
+DriveMaker = Callable[[SimulatedDriveParameters, Random], SimulatedDrive]
+SIMULATED_DRIVES: Mapping[str, DriveMaker] = {
     "odrive": SimulatedOdrive,
     "odrive05": SimulatedOdrive05,
     "moteus": SimulatedMoteus,

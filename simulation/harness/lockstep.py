@@ -12,6 +12,7 @@ from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
+from drivers.drives import Drives
 from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import USUAL_S, Failures, begin_text, end_text
@@ -24,6 +25,7 @@ from firmware_host.ticker import Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
+from simulation.devices.drive_types import DriveMaker, make_simulated_drive
 from simulation.devices.motion_capture import SimulatedPose
 from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.harness.robot import SimulatedRobot
@@ -80,6 +82,8 @@ class Lockstep:
     up late by `late_s`, less than a period, and the wall clock is ahead by `wall_offset_s`.
     """
 
+    _make_drive: DriveMaker = staticmethod(make_simulated_drive)
+
     def __init__(
         self,
         configuration: Configuration,
@@ -107,21 +111,26 @@ class Lockstep:
             configuration.bus_of,
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
+            make_drive=self._make_drive,
         )
-        wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
-        ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
         rows, wall_clock = recorder or NullRecorder(), self._wall_s
         if failures is not None:
             pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
             wall_clock = FailingClock(wall_clock, failures)
-        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
+        drives_of_loop = self._connect(configuration, failures)
+        self.loop = Loop(configuration, drives_of_loop, pose, rows, self._now_s, wall_clock, period_s)
         self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
         self.tick_number = 0
         self.late_s = 0.0
         self.acts: list[Callable[[], None]] = []  # called in every step, after the robot's and before the loop's
+
+    def _connect(self, configuration: Configuration, failures: Failures | None) -> Drives:
+        """Return the loop's drives, at its ends of the buses."""
+        wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
+        return make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
 
     @property
     def now_s(self) -> float:

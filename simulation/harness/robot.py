@@ -13,7 +13,7 @@ from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.drive_types import connect_drives, make_simulated_drive
+from simulation.devices.drive_types import DriveMaker, connect_drives, make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster
 from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.mud.track import Track
@@ -31,11 +31,12 @@ class SimulatedRobot:
         ports: Mapping[str, CanPort],
         seed: int = 1,
         start_s: float = 0.0,
+        make_drive: DriveMaker = make_simulated_drive,
     ) -> None:
         random = Random(seed)
         self.plant = Plant(plant, track, Random(f"mud {seed}"))  # independent of the drives' draws
         joints = plant.rig.joints
-        self.drives: Joints[SimulatedDrive] = Joints(*(make_simulated_drive(drives[joint], random) for joint in joints))
+        self.drives: Joints[SimulatedDrive] = Joints(*(make_drive(drives[joint], random) for joint in joints))
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in joints)
         self._drives_on = [
             (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])
