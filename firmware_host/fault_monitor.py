@@ -223,6 +223,7 @@ class FaultMonitor:
             moving=mode in MOVING,
             may_stand_still=monitor_input.freeing or mode not in HELD,
             damping=mode is Mode.DAMPING,
+            held=mode is Mode.HOLD,
         )
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:

@@ -45,6 +45,7 @@ class TickFacts(NamedTuple):
     moving: bool  # closed loop is expected of the drives
     may_stand_still: bool  # at any torque: without stiffness, or in a recovery that pulls on purpose
     damping: bool = False
+    held: bool = False  # the mode is HOLD
 
 
 class JointMonitor:
@@ -222,7 +223,7 @@ class JointMonitor:
         if encoder_fault or not facts.moving:
             self._motion.reset()
         else:
-            self._motion.update(found, state, seen_s, torque_nm, target)
+            self._motion.update(found, state, seen_s, torque_nm, target, facts.held)
 
     def _out_of_range(self, angle_rad: float, low_rad: float, high_rad: float) -> Fault:
         low_deg, high_deg = degrees(low_rad), degrees(high_rad)

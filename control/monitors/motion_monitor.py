@@ -18,9 +18,9 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  stops yield to a torque or resist it, and a load that outweighs it moves the joint until both are
                  equal. A target that moves against a torque near the limit does not lead: the joint is far ahead. Only
                  where the joint presses against its stop while the encoder slips together with its speed does it seem
-                 to move on. An encoder that slips alone is found before (speed_monitor.py). Where the target stands
-                 still, a hand that pushes or hangs a weight moves a joint just so, up to the largest torque: only a
-                 torque near the limit counts there.
+                 to move on. An encoder that slips alone is found before (speed_monitor.py). A hand that pushes a joint
+                 in a held pose, or hangs a weight, moves it just so, up to the largest torque: only a torque near the
+                 limit counts there.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -42,10 +42,11 @@ AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
-PRESSING_FRACTION = 0.9  # of the torque limit, where the target stands still
+PRESSING_FRACTION = 0.9  # of the torque limit, in a held pose and without a target
 DRIVEN_BACK_S = 0.09
 DRIVEN_BACK_RAD = 0.0027  # in each interval, 0.03 rad/s: seven steps of a 14-bit encoder
-DRIVEN_BACK_INTERVALS = 3  # in a row, so after at most four; a body that sinks pushes a swing back in two
+DRIVEN_BACK_INTERVALS = 3.0  # in a row; a body that sinks pushes a swing back in two
+STANDING_INTERVAL = 0.6  # of an interval: mud that an insertion displaces pushes a sweep back in two
 LONGEST_GAP_S = 0.03  # between two samples
 PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
 SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
@@ -82,13 +83,22 @@ class MotionMonitor:
         self._target_rad = self._lag_rad = UNKNOWN
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
-        self.driven_back = 0  # intervals in a row
+        self.driven_back = 0.0  # intervals in a row
         self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
 
     def update(
-        self, found: list[Fault], state: DriveState, dt_s: float, torque_nm: float, target: JointTarget | None
+        self,
+        found: list[Fault],
+        state: DriveState,
+        dt_s: float,
+        torque_nm: float,
+        target: JointTarget | None,
+        held: bool,
     ) -> None:
-        """Add the faults of a new sample. `torque_nm` was commanded for the last `dt_s`; no target: no stiffness."""
+        """Add the faults of a new sample. `torque_nm` was commanded for the last `dt_s`; no target: no stiffness.
+
+        `held`: a hand may push a joint whose target stands still.
+        """
         self._impulse_nm_s += torque_nm * dt_s
         self._elapsed_s += dt_s
         stamp_s, elapsed_s = state.angle_stamp_s, self._elapsed_s
@@ -100,7 +110,7 @@ class MotionMonitor:
         step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
         measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
         if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
-            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad)
+            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, held)
         self._impulse_nm_s = self._elapsed_s = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
         self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
@@ -109,16 +119,17 @@ class MotionMonitor:
         if not following or not explained or self.away_rad > AWAY_RAD:
             self._report(found, target)
 
-    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float) -> None:
+    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float, held: bool) -> None:
         """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
         target_step_rad = target_rad - self._target_rad
-        least_nm = PRESSING_NM if target_step_rad > 0.0 or target_step_rad < 0.0 else self._held_nm  # also without one
+        excused = target_step_rad != target_step_rad or (held and target_step_rad == 0.0)  # not a number: no target
+        least_nm = self._held_nm if excused else PRESSING_NM
         if -least_nm < torque_nm < least_nm:
             self._pressing_nm = torque_nm
-            self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
+            self.driven_back = self._pressed_s = self._back_rad = 0.0
         else:
             self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
@@ -128,11 +139,8 @@ class MotionMonitor:
             self.away_rad = 0.0
             return
         self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
-        step_of_target_rad = abs(target_step_rad)
-        if step_of_target_rad != step_of_target_rad:
-            return
         error_rad = abs(target_rad - (self._angle_rad + step_rad)) - self._lag_rad
-        away_rad = self.away_rad + (abs(step_rad) - step_of_target_rad) + error_rad
+        away_rad = self.away_rad + (abs(step_rad) - abs(target_step_rad)) + error_rad  # begins again without a target
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
@@ -140,14 +148,16 @@ class MotionMonitor:
         lasts = torque_nm * self._pressing_nm >= 0.0
         self._pressing_nm = torque_nm
         if not lasts:
-            self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
+            self.driven_back = self._pressed_s = self._back_rad = 0.0
             return
         back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
-        leads = target_back_rad > 0.0 and abs(torque_nm) < self._held_nm
+        near_limit = abs(torque_nm) >= self._held_nm
+        leads = target_back_rad > 0.0 and not near_limit
         self._pressed_s += elapsed_s
         self._back_rad += back_rad - target_back_rad if leads else back_rad
         if self._pressed_s >= DRIVEN_BACK_S:
-            self.driven_back = self.driven_back + 1 if self._back_rad > DRIVEN_BACK_RAD else 0
+            more = 1.0 if near_limit or target_step_rad else STANDING_INTERVAL
+            self.driven_back = self.driven_back + more if self._back_rad > DRIVEN_BACK_RAD else 0.0
             self._pressed_s = self._back_rad = 0.0
 
     def _report(self, found: list[Fault], target: JointTarget | None) -> None:

@@ -5,7 +5,7 @@ Bounds are pinned from both sides with figures instead of the module's own const
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import repeat
 from math import cos, inf, nextafter, pi, sin
 from random import Random
@@ -63,7 +63,7 @@ def noisy(velocity_rad_s: float, count: int) -> list[float]:
         # 30 mrad of the velocity's path
         *((0.021, noisy(sign * 1.4, 2), None) for sign in (-1.0, 1.0)),
         *((0.021, noisy(sign * 1.6, 2), 1) for sign in (-1.0, 1.0)),
-        (0.0625, [0.5, 0.48], None),  # exactly
+        (1 / 64, [0.96] * 3, None),  # exactly
         (0.01, noisy(0.99, 4), None),
         (0.01, noisy(1.01, 4), 3),
         # 20 ms, of a fast angle
@@ -214,6 +214,50 @@ def test_a_jump_reports_the_step_in_degrees_and_the_gap_in_milliseconds() -> Non
     fault = encoder.update(DriveState(-1.0, 0.0, 0.002), PERIOD_S)
     assert fault is not None and fault.subject == "left_sweep"
     assert dict(fault.values) == pytest.approx({"step_deg": 57.29578, "gap_ms": 2.0})
+
+
+def test_a_jump_of_exactly_its_bound_may_be_a_late_stamp() -> None:
+    bound_rad = 0.5 + 1.0 * 0.25 + 1.0 / 64.0  # the bound, a stamp that is late, and the path
+    for angle_rad, expected in ((bound_rad, None), (nextafter(bound_rad, inf), "encoder_jump")):
+        encoder = EncoderMonitor("left_sweep", 0.5)
+        encoder.update(DriveState(0.0, 1.0, 0.0), 0.25)
+        fault = encoder.update(DriveState(angle_rad, 1.0, 1.0 / 64.0), 0.25)
+        assert (fault and fault.name) == expected
+
+
+@pytest.mark.parametrize("before", range(98, 105))
+def test_a_jump_is_found_wherever_the_sums_of_the_speed_begin_again(before: int) -> None:
+    """They do after every 50 messages, but for the first 50."""
+    quiet = [(0.3 + COUNT_RAD * (number % 2), 0.0) for number in range(before)]
+    assert found(messages([*quiet, (-1.0, 0.0)]))[-1] == "encoder_jump"
+
+
+@pytest.mark.parametrize(("gap_s", "slips"), [(0.012, True), (0.0121, False)])
+def test_the_path_over_a_gap_is_no_slip(gap_s: float, slips: bool) -> None:
+    before = [((number - 70) * MESSAGE_S, COUNT_RAD * (number % 2), 0.0) for number in range(71)]
+    after = [(gap_s + number * MESSAGE_S, 0.2 + COUNT_RAD * (number % 2), 0.0) for number in range(150)]
+    names = found([*before, *after], EncoderMonitor("left_sweep", 0.5))
+    assert ("encoder_slips" in names) == slips
+
+
+@pytest.mark.parametrize("forget", [EncoderMonitor.reset, EncoderMonitor.release])
+@pytest.mark.parametrize(("rate_rad_s", "each"), [(0.05, 1250), (2.0, 45)])  # 2.5 s, and less than an interval of sums
+def test_a_slip_begins_again_once_torque_was_off(
+    forget: Callable[[EncoderMonitor], None], rate_rad_s: float, each: int
+) -> None:
+    slipping = messages((rate_rad_s * max(number - 51, 0) * MESSAGE_S, 0.0) for number in range(51 + 2 * each))
+    assert "encoder_slips" in found(slipping)
+    encoder = make_encoder()
+    names = found(slipping[: 51 + each], encoder)
+    forget(encoder)
+    assert not set(names + found(slipping[51 + each :], encoder)) - {""}
+
+
+def test_a_torque_from_before_it_was_off_is_no_change() -> None:
+    encoder, resting = make_encoder(), messages([(0.3, 0.0)] * 100)
+    names = found(resting[:50], encoder)
+    encoder.release()
+    assert not any(names + found(resting[50:], encoder, repeat(0.5)))
 
 
 def test_reset_forgets_the_last_message() -> None:
