@@ -17,6 +17,8 @@ class Subject(NamedTuple):
 A_TEXT = "a text of the diagram"
 CONTINUOUS = "it has the same value there from both sides"
 MORE_OFTEN = "the same counters are only read more often"
+ROUNDED = "a sum of such times never is exactly the bound"
+SAME = "the same value replaces itself"
 REPORTED = "the report tests the exact bound again"
 SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
@@ -93,18 +95,33 @@ SUBJECTS = (
         equivalent={
             "always in `if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:`": MORE_OFTEN,
             "Lt to LtE in `state.bus_voltage_v < self._bounds.voltage_low_v`": MORE_OFTEN,
-            "LtE to Lt in `facts.dt_s <= MOST_SEEN_S`": "the same value replaces itself",
+            "LtE to Lt in `facts.dt_s <= MOST_SEEN_S`": SAME,
         },
     ),
     Subject(
         "control.monitors.encoder_monitor",
-        ("control/monitors/test_encoder_monitor.py",),
+        ("control/monitors/test_encoder_monitor.py", "control/monitors/test_speed_monitor.py"),
         equivalent={
             "0.0 to 1.0 in `self, state: DriveState, dt_s: float, torque_nm: float=0.0`": "a torque that never changes",
             "without `self._reset_frozen()` in `def reset(self) -> None:`": "the first message does the same",
-            "never in `if not error_rad > self._jump_rad:`": SPEED,
-            "without `return None` in `if not error_rad > self._jump_rad:`": SPEED,
-            "Gt to GtE in `error_rad > self._jump_rad`": "the exact bound is compared again",
+            "without `self._begin_interval()` in `def reset(self) -> None:`": "the first message does the same",
+            "Gt to GtE in `stamp_s > before_s`": "the same stamp has returned before",
+            "Gt to GtE in `gap_s > 0.0`": "no stamp goes back",
+            **{
+                f"{change} in `{step}`": REPORTED
+                for change, step in (
+                    ("always", "if not -self._jump_rad <= step_rad - path_rad <= self._jump_rad:"),
+                    ("LtE to Lt", "-self._jump_rad <= step_rad - path_rad <= self._jump_rad"),
+                    ("sign or not taken away", "-self._jump_rad"),
+                )
+            },
+            "always in `if self._repeated:`": SPEED,
+            "False to True in `self._repeated = False`": SPEED,
+            "Gt to GtE in `self._interval_s > 0.0`": ROUNDED,
+            "GtE to Gt in `self._interval_s >= INTERVAL_S`": ROUNDED,
+            "Gt to GtE in `self._ignored_s > YIELDS_S`": ROUNDED,
+            "Lt to LtE in `torque_nm < self._lowest_nm`": SAME,
+            "Gt to GtE in `torque_nm > self._highest_nm`": SAME,
         },
     ),
     Subject(
@@ -113,12 +130,15 @@ SUBJECTS = (
         equivalent={
             "Gt to GtE in `self._lag_rad > self._following_rad`": REPORTED,
             "LtE to Lt in `self.unexplained_j <= self._runaway_j`": REPORTED,
-            "LtE to Lt in `self.away_rad <= AWAY_RAD`": REPORTED,
-            "always in `if not (following and self.unexplained_j <= self._runaway_j and"
-            " (self.away_rad <= AWAY_RAD`": REPORTED,
+            "Gt to GtE in `self.away_rad > AWAY_RAD`": REPORTED,
+            "always in `if not following or not explained or self.away_rad > AWAY_RAD:`": REPORTED,
             "Gt to GtE in `unexplained_j > 0.0`": CONTINUOUS,
             "Gt to GtE in `away_rad > 0.0`": CONTINUOUS,
-            "without `self._target_rad = UNKNOWN` in `def reset(self) -> None:`": "the first sample sets it",
+            "without `self._target_rad = self._lag_rad = UNKNOWN` in `def reset(self) -> None:`": "a sample sets it",
+            "Gt to GtE in `torque_nm > 0.0`": "no torque presses that is zero",
+            "Gt to GtE in `target_back_rad > 0.0`": "it subtracts nothing",
+            "GtE to Gt in `self._pressed_s >= DRIVEN_BACK_S`": ROUNDED,
+            "Gt to GtE in `self._back_rad > DRIVEN_BACK_RAD`": ROUNDED,
         },
     ),
     Subject("firmware_host.lease", ("firmware_host/test_lease.py",)),
