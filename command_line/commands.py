@@ -42,6 +42,7 @@ COMMANDS: Mapping[str, Command] = {
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
     "run": ("operation.run.run", "Walk by a control law of your own: a function in a file, called once a stride."),
     "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
+    "probe": ("operation.probe.probe", "Find the height of the mud, with its error, by light touches."),
     "stop": ("operation.confirmation.stop", "End the walk, raise the flippers and hold the pose."),
     "joy": ("operation.joy.joy", "Drive the robot by a gamepad or keys: it stops when a button is released."),
     "disarm": ("operation.confirmation.disarm", "Switch torque off at once, in any state."),

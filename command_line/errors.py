@@ -66,6 +66,7 @@ def explain(problem: Exception) -> tuple[Sequence[str], int]:
 
 
 def _explain_files_and_buses(problem: Exception) -> tuple[Sequence[str], int]:
+    from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError
     from firmware_host.buses import BusError  # imports too much for `status`
     from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError, why_not
     from logs.files.log_error import LogError
@@ -75,6 +76,12 @@ def _explain_files_and_buses(problem: Exception) -> tuple[Sequence[str], int]:
             return problem.problems, exit_codes.UNHEALTHY
         case ConfigurationError():
             return problem.problems, exit_codes.CONFIGURATION
+        case DaemonLostError():
+            return [str(problem)], exit_codes.NO_DAEMON
+        case AccessDeniedError():
+            return [str(problem)], exit_codes.NOT_PERMITTED
+        case BenchError():
+            return [str(problem)], exit_codes.REFUSED
         case BusError() | LogError():
             return [str(problem)], exit_codes.UNHEALTHY
         case OSError():

@@ -20,6 +20,7 @@ SCHEMAS = {  # what prints it -> version
     "failures": 1,
     "demo": 1,
     "drives-find": 1,
+    "probe": 1,
     "replay": 1,
     "log-annotate": 1,
     "log-comparison": 1,

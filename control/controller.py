@@ -5,6 +5,7 @@ wants none. The limits decide which torques leave for the drives (control/limits
 """
 
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -156,11 +157,14 @@ class Controller:
         """Stop a move; the joints hold their present targets."""
         self._move = None
 
-    def move(self, angles: Sequence[float | None]) -> None:
-        """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle."""
+    def move(self, angles: Sequence[float | None], speed_rad_s: float = inf) -> None:
+        """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle.
+
+        They never move faster than configured.
+        """
         held = self._pose.map(lambda target: target.angle_rad)
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
-        self.follow_path([there], self.motion.path_speed_rad_s)
+        self.follow_path([there], min(speed_rad_s, self.motion.path_speed_rad_s))
 
     def follow_path(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
         """In hold, move smoothly from the held pose through these poses, and hold the last one."""

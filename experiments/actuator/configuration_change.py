@@ -26,11 +26,16 @@ def find_target(path: Path, text: str, session: Session) -> Path:
         copy = session.folder / COPY
         copy.write_text(text, encoding="utf-8")
         return copy
+    require_changeable(path, text)
+    return path
+
+
+def require_changeable(path: Path, text: str) -> None:
+    """Raises BenchError for a file that is not the configuration that the daemon runs with, or that is not writable."""
     if read_text(path) != text:
         raise BenchError(f"the daemon does not run with {path}: name its file with --config, or restart it")
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
         raise BenchError(f"you may not write {path}; run this as a user who may, such as root")
-    return path
 
 
 def fitted_changes(fits: Sequence[JointFit], session: Session) -> dict[tuple[str, ...], Any]:

@@ -64,6 +64,7 @@ class CompletedWalk(NamedTuple):
 
 Status = dict[str, Any]
 End = TypeVar("End")
+Arrived = Callable[[Status], bool]
 WalkMonitor = Callable[[Status], End | None]  # None while the walk continues, then how it ends
 
 
@@ -175,11 +176,13 @@ def disarm(robot: BenchRobot) -> None:
     wait_until(robot, lambda now: now["mode"] not in ENERGISED, ARMING_S, "switching torque off")
 
 
-def move(robot: BenchRobot, angles_rad: Mapping[str, float]) -> None:
-    """Move joints of a robot that holds its pose, until they are there. Raises BenchError."""
+def move(
+    robot: BenchRobot, angles_rad: Mapping[str, float], arrived: Arrived = lambda now: False, **speed: float
+) -> None:
+    """Move joints of a robot that holds its pose, until they are there or a status has `arrived`. Raises BenchError."""
     require_hold(robot.call("status"))
-    robot.call("move", **{f"{joint}_rad": angle_rad for joint, angle_rad in angles_rad.items()})
-    after = wait_until(robot, lambda now: not now["moving"], MOVING_S, "moving the joints")
+    robot.call("move", **{f"{joint}_rad": angle_rad for joint, angle_rad in angles_rad.items()}, **speed)
+    after = wait_until(robot, lambda now: not now["moving"] or arrived(now), MOVING_S, "moving the joints")
     require_hold(after)
     if after["notice"]:
         raise BenchError(after["notice"])

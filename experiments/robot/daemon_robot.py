@@ -208,6 +208,11 @@ class DaemonRobot:
             remains = f"it remains in {segments[-1].parent.parent}, copy it from there"
             raise BenchError(f"the daemon's log cannot be copied: {why_not(problem, folder)}; {remains}") from problem
 
+    def leave_holding(self) -> None:
+        """Release and disconnect; the robot goes on holding its pose. Raises BenchError, CallRefusedError."""
+        self.call("release")
+        self._client.close()
+
     def close(self) -> None:
         """Stop, disarm and release, unless another program operates the robot."""
         with suppress(BenchError, CallRefusedError):

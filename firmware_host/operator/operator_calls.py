@@ -241,7 +241,7 @@ class OperatorCalls:
             raise RefusedError("the flippers may be in the mud: 'mudskipper stop' raises them first")
         if loop.fault:
             raise RefusedError(loop.fault.message)
-        loop.move(angles_rad, self._clock(), str(caller))
+        loop.move(angles_rad, params["speed_rad_s"], self._clock(), str(caller))
         return "accepted"
 
     def _renew_lease(self, caller: Caller, for_s: float) -> str:

@@ -135,6 +135,14 @@ ANGLES = tuple(
     Parameter(f"{joint}_rad", Type.NUMBER, f"angle that the {joint} joint moves to", "rad", bounds_note=IN_RANGE)
     for joint in JOINTS
 )
+SPEED = Parameter(
+    "speed_rad_s",
+    Type.NUMBER,
+    "highest speed of a joint; never above motion.path_speed_rad_s",
+    "rad/s",
+    range=Bounds(0.01, 10.0),
+    default=10.0,
+)
 SINCE = Parameter(
     "since", Type.INTEGER, "number of the first stride wanted", range=Bounds(0, LARGEST_INTEGER), default=0
 )
@@ -312,7 +320,7 @@ METHODS: dict[str, SocketMethod] = {
     "move": SocketMethod(
         Level.DRIVE,
         "Move joints slowly to angles while the robot holds its pose; at least one joint is required.",
-        (*ANGLES, *LEASE),
+        (*ANGLES, SPEED, *LEASE),
         refuses_unknown=True,
     ),
     "stop": SocketMethod(Level.ANYONE, "End a walk or a move; a walk ends with the flippers raised."),

@@ -217,7 +217,18 @@ WRONG_CONFIGURATIONS += [
     ("init - --node left_sweep=1 --node right_sweep=1", "has the same on bus"),
 ]
 NEEDS_DAEMON = (
-    *("status", "arm", "walk --depth 2.0cm", "move left_sweep=10", "stop", "disarm", "clear", "fail --list", "watch"),
+    *(
+        "status",
+        "arm",
+        "probe",
+        "walk --depth 2.0cm",
+        "move left_sweep=10",
+        "stop",
+        "disarm",
+        "clear",
+        "fail --list",
+        "watch",
+    ),
     *(EXPERIMENT.format(name) for name in ("trackway", "flipper --mud 47.6", "walk --mud 47.6")),
 )
 CASES = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from types import SimpleNamespace
 from typing import Any
 
@@ -59,7 +60,7 @@ class AbstractController(Controller):
     def fault(self) -> Fault | None:
         return None
 
-    def move(self, angles: Any) -> None:
+    def move(self, angles: Any, speed_rad_s: float = inf) -> None:
         self.is_moving = True
 
     def end_move(self) -> None:

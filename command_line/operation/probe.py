@@ -1,0 +1,87 @@
+"""Finds the height of the mud with the flippers of a robot that holds its pose: `mudskipper probe`."""
+
+from difflib import unified_diff
+from math import degrees
+from pathlib import Path
+from sys import stderr
+from typing import Annotated, Any
+
+from command_line import exit_codes
+from command_line.errors import CommandError
+from command_line.json_output import Answer
+from command_line.screen import Progress
+from command_line.shared_options import Socket
+from experiments.actuator.configuration_change import require_changeable
+from experiments.actuator.file_change import Changes, changed_text, replace_file
+from experiments.reports.text_tables import table
+from experiments.robot.daemon_robot import DaemonRobot
+from experiments.robot.surface_probe import ProbedSurface, probe_surface
+from experiments.study.option import Option
+
+
+def probe(
+    *,
+    socket: Socket,
+    config: Annotated[Path | None, Option("of the daemon, to write the height and its error to")] = None,
+) -> Answer:
+    """Touch the mud lightly at five sweeps of each flipper, and write what was found into the log."""
+    robot, progress = DaemonRobot(socket), Progress("touches")
+    leave = robot.leave_holding
+    try:
+        text = robot.configuration.text
+        if (mode := robot.call("status")["mode"]) != "hold":
+            message = f"the robot is in {mode} and does not hold its pose: 'mudskipper arm' first"
+            raise CommandError(message, status=exit_codes.REFUSED)
+        if config:
+            require_changeable(config, text)
+        leave = robot.close
+        found = probe_surface(robot, progress.show)
+        robot.call("note", text=f"probe: {surface_text(found)}")
+        leave = robot.leave_holding
+    finally:
+        progress.clear()
+        leave()
+    axis_height_m = robot.configuration.geometry.axis_height_m + found.depth_m
+    changes: Changes = {
+        ("geometry", "axis_height_m"): round(axis_height_m, 5),
+        ("estimation", "surface_error_m"): round(found.stride_error_m, 5),
+    }
+    if config:
+        write(config, text, changes)
+    return Answer(probe_report(found, changes), probe_text(found, changes), schema="probe")
+
+
+def surface_text(found: ProbedSurface) -> str:
+    side = "below" if found.depth_m > 0.0 else "above"
+    return (
+        f"the surface is {1000.0 * abs(found.depth_m):.1f} ± {1000.0 * found.std_error_m:.1f} mm {side} its nominal"
+        f" height, and differs by {1000.0 * found.scatter_m:.1f} mm between {len(found.touches)} touches"
+    )
+
+
+def probe_text(found: ProbedSurface, changes: Changes) -> str:
+    rows = [["flipper", "sweep", "below nominal", "std. error"]]
+    for flipper, sweep_rad, surface in found.touches:
+        cells = (f"{1000.0 * each:z.2f} mm" for each in (surface.depth_m, surface.std_error_m))
+        rows.append([flipper, f"{degrees(sweep_rad):z.0f}°", *cells])
+    keys = "\n".join(f"{'.'.join(key)} = {value}" for key, value in changes.items())
+    return f"{table(rows)}\n\n{surface_text(found)}. In the configuration this is\n{keys}"
+
+
+def probe_report(found: ProbedSurface, changes: Changes) -> dict[str, Any]:
+    touches = [
+        {"flipper": flipper, "sweep_rad": sweep_rad, "depth_m": each.depth_m, "std_error_m": each.std_error_m}
+        for flipper, sweep_rad, each in found.touches
+    ]
+    summary = {"depth_m": found.depth_m, "std_error_m": found.std_error_m, "scatter_m": found.scatter_m}
+    return summary | {key: value for (*_, key), value in changes.items()} | {"touches": touches}
+
+
+def write(path: Path, before: str, changes: Changes) -> None:
+    """Write the keys, and show the difference. Raises BenchError."""
+    after = changed_text(before, changes)
+    backup = replace_file(path, before, after)
+    shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
+    print(
+        *shown, f"the old file is {backup.name}; 'systemctl restart mudskipper' uses the new one", sep="\n", file=stderr
+    )
