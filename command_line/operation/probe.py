@@ -9,10 +9,10 @@ from typing import Annotated, Any
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.json_output import Answer
-from command_line.screen import Progress
+from command_line.screen import Progress, complain
 from command_line.shared_options import Socket
 from experiments.actuator.configuration_change import require_changeable
-from experiments.actuator.file_change import Changes, changed_text, replace_file
+from experiments.actuator.file_change import Changes, FileChangeError, changed_text, replace_file
 from experiments.reports.text_tables import table
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.surface_probe import ProbedSurface, probe_surface
@@ -46,9 +46,14 @@ def probe(
         ("geometry", "axis_height_m"): round(axis_height_m, 5),
         ("estimation", "surface_error_m"): round(found.stride_error_m, 5),
     }
-    if config:
-        write(config, text, changes)
-    return Answer(probe_report(found, changes), probe_text(found, changes), schema="probe")
+    status = exit_codes.OK
+    try:
+        if config:
+            write(config, text, changes)
+    except FileChangeError as problem:  # such as a greatest depth that is out of reach then
+        complain(str(problem))
+        status = exit_codes.REFUSED
+    return Answer(probe_report(found, changes), probe_text(found, changes), status, schema="probe")
 
 
 def surface_text(found: ProbedSurface) -> str:
@@ -78,7 +83,7 @@ def probe_report(found: ProbedSurface, changes: Changes) -> dict[str, Any]:
 
 
 def write(path: Path, before: str, changes: Changes) -> None:
-    """Write the keys, and show the difference. Raises BenchError."""
+    """Write the keys, and show the difference. Raises FileChangeError."""
     after = changed_text(before, changes)
     backup = replace_file(path, before, after)
     shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")

@@ -15,7 +15,7 @@ from estimation.strokes.surface import NO_SURFACE
 from experiments.robot.surface_probe import ProbedSurface, Touch
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 
-FOUND = ProbedSurface([Touch("left", 0.5, NO_SURFACE._replace(depth_m=0.002, std_error_m=1e-4))], 0.002, 3e-4, 4e-4)
+FOUND = ProbedSurface([Touch("left", 0.5, NO_SURFACE._replace(depth_m=-0.002, std_error_m=1e-4))], -0.002, 3e-4, 4e-4)
 
 
 class Robot:
@@ -53,12 +53,24 @@ def test_height_and_error_go_to_the_log_and_to_the_file(
     path.write_text(example_text, encoding="utf-8")
     assert main(["probe", "--json", "--config", str(path)]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
-    assert (report["schema"], report["depth_m"], len(report["touches"])) == ("probe/1", 0.002, 1)
+    assert (report["schema"], report["depth_m"], len(report["touches"])) == ("probe/1", -0.002, 1)
     assert robot.calls == ["status", "note", "leave_holding"]
     changed = load_configuration(path)
-    assert changed.geometry.axis_height_m == pytest.approx(robot.configuration.geometry.axis_height_m + 0.002)
+    assert changed.geometry.axis_height_m == pytest.approx(robot.configuration.geometry.axis_height_m - 0.002)
     assert changed.estimation.surface_error_m == report["surface_error_m"] == pytest.approx(5e-4)
     assert path.with_name("mudskipper.toml.before").read_text(encoding="utf-8") == example_text
+
+
+def test_a_height_with_which_strides_are_out_of_reach_is_reported_and_not_written(
+    robot: Robot, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(probe, "probe_surface", lambda robot, show: FOUND._replace(depth_m=0.02))
+    path = tmp_path / "mudskipper.toml"
+    path.write_text(robot.configuration.text, encoding="utf-8")
+    assert main(["probe", "--json", "--config", str(path)]) == exit_codes.REFUSED
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["depth_m"] == 0.02 and "max_depth_m" in printed.err
+    assert path.read_text(encoding="utf-8") == robot.configuration.text
 
 
 @pytest.mark.parametrize(("mode", "text"), [("idle", None), ("hold", "another = 1\n")])
