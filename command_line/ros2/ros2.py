@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 from command_line import exit_codes
-from command_line.errors import explain, usage_error
+from command_line.errors import explain
 from command_line.live.live import pass_on
 from command_line.ros2.leased_walk import LeasedWalk
 from command_line.shared_options import Socket
@@ -35,7 +35,7 @@ def ros_namespace(text: str) -> str:
 def ros2(
     *,
     socket: Socket,
-    router: Annotated[str, Option("Zenoh router of the ROS 2 computers")] = "tcp/localhost:7447",
+    router: Annotated[str, Option("Zenoh router of the ROS 2 computers", metavar="ADDRESS")] = "tcp/localhost:7447",
     domain: Annotated[int, Option("the other computers' ROS_DOMAIN_ID", low=0, high=232)] = 0,
     namespace: Annotated[
         str, Option("of all topics and services, such as mud1", metavar="NAME", parse=ros_namespace)
@@ -52,11 +52,10 @@ def ros2(
             audience = RosAudience(session, node)
             for name, act in _services(socket, allow_drive).items():
                 node.serve(name, partial(_attempt, act))
+            node.watch_others()
             place = f"{namespace or '/'} in domain {domain} by {router}"
             print(f"ROS 2 {distribution}: {place}. Files for the laptop: {LAPTOP_FILES}. Ctrl-C ends.", flush=True)
             pass_on(RowSubscription(stream_path(socket)), audience)
-    except ValueError as problem:
-        raise usage_error(f"--router {problem}") from None
     except KeyboardInterrupt:
         return exit_codes.OK
 

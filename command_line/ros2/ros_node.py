@@ -14,6 +14,7 @@ from typing import Any
 
 import zenoh
 
+from command_line.errors import usage_error
 from command_line.ros2.rmw_names import (
     ATTACHMENT,
     GID_BYTES,
@@ -37,12 +38,12 @@ Act = Callable[[], tuple[bool, str]]  # returns whether it succeeded, and a mess
 
 
 def connect(router: str) -> zenoh.Session:
-    """Return a session with the router, once it answers. Raises ValueError for a malformed address."""
+    """Return a session with the router, once it answers. Raises CommandError for a malformed address."""
     configuration = zenoh.Config()
     try:
         configuration.insert_json5("connect/endpoints", json.dumps([router]))
     except zenoh.ZError:
-        raise ValueError(f"{router}: must be such as tcp/192.168.1.5:7447") from None
+        raise usage_error(f"--router {router}: must be such as tcp/192.168.1.5:7447") from None
     configuration.insert_json5("mode", '"client"')
     configuration.insert_json5("scouting/multicast/enabled", "false")
     complained = False
@@ -89,7 +90,10 @@ class RosNode:
         self._said: set[str] = set()
         self._alive: list[Any] = []  # tokens and services, which end when nothing refers to them
         self._declare_token(self._node)
-        self._alive.append(session.liveliness().declare_subscriber(TOKENS, self._check_other, history=True))
+
+    def watch_others(self) -> None:
+        """Say what keeps other nodes from this one; call it after all is declared, as some are there already."""
+        self._alive.append(self._session.liveliness().declare_subscriber(TOKENS, self._check_other, history=True))
 
     def publisher(self, topic: str, type_name: str, type_hash: str) -> RosPublisher:
         endpoint = self._endpoint(PUBLISHER, self._namespace + topic, type_name, type_hash)
@@ -107,8 +111,9 @@ class RosNode:
                     query.reply_err(f"{name}: the request has no attachment of rmw_zenoh")
                     return
                 number, _, _, gid = ATTACHMENT.unpack(request)
+                response = RESPONSE.encode(*act())
                 attachment = ATTACHMENT.pack(number, time.time_ns(), GID_BYTES, gid)
-                query.reply(endpoint.key, RESPONSE.encode(*act()), attachment=attachment)
+                query.reply(endpoint.key, response, attachment=attachment)
 
         self._alive.append(self._session.declare_queryable(endpoint.key, answer, complete=True))
         self._declare_token(endpoint)
@@ -125,7 +130,6 @@ class RosNode:
         return token
 
     def _check_other(self, sample: zenoh.Sample) -> None:
-        """Say what keeps another node from this one, once."""
         other = read_token(str(sample.key_expr))
         if other is None or sample.kind != zenoh.SampleKind.PUT:
             return

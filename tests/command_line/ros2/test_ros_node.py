@@ -197,7 +197,12 @@ def test_nodes_that_do_not_meet_this_one_are_named_once(graph: Graph, monkeypatc
         viewer._replace(domain=5, node="/other_domain", name="/some"),
         viewer._replace(domain=6, node="/last"),
     ]
-    tokens = [graph.other.liveliness().declare_token(each.token("abc", n)) for n, each in enumerate(others)]
+    tokens = []
+    for number, each in enumerate(others):
+        tokens.append(graph.other.liveliness().declare_token(each.token("abc", number)))
+        if number == len(others) // 2:  # some are there before this node, others come later
+            wait_until(lambda: len(graph.tokens) == 2 + len(tokens))
+            node.watch_others()
     wait_until(lambda: any("/last" in problem for problem in said))
     assert sorted(problem.split()[0] for problem in said) == ["/last", "/other_domain", "/other_hash", "/other_type"]
     assert len(tokens) == len(others)
