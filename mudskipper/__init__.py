@@ -1,7 +1,7 @@
 """The public interface for people's own scripts and notebooks.
 
-`open_log` reads a log into numpy arrays, `replay` estimates the mud from a log again, and `Client` operates a robot
-through the daemon's socket.
+`open_log` reads a log into numpy arrays, `replay` estimates the mud from a log again, `Client` operates a robot through
+the daemon's socket, and `simulate` starts a simulated one. `mudskipper.gym` is imported apart, as it needs Gymnasium.
 """
 
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -9,6 +9,7 @@ from firmware_host.software_version import software_version
 from logs.files.log_error import LogError
 from mudskipper.client import Client
 from mudskipper.logs import OpenedLog, open_log, replay
+from mudskipper.simulated_robot import simulate
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError
 
 __version__ = software_version()
@@ -23,4 +24,5 @@ __all__ = [
     "__version__",
     "open_log",
     "replay",
+    "simulate",
 ]

@@ -1,103 +1,53 @@
 """Runs a simulated robot and the real daemon as two processes, and makes the robot walk through the daemon's socket.
 
-Both processes run in sessions of their own, so Ctrl-C reaches only this program, which ends the daemon first: the
-daemon needs the robot to stop in order. Their files are in a folder that is removed afterwards.
+Their files are in a folder that is removed afterwards.
 """
 
 import shutil
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from command_line.errors import CommandError
-from operator_client.status_client import NoDaemonError, StatusClient
-from simulation.harness.local_setup import write_local_setup
-from simulation.harness.peer import end_with_parent
+from operator_client.status_client import StatusClient
+from simulation.harness.local_robot import LocalRobot
 from simulation.harness.world import load_world
 from simulation.mud.track import Track, paper_track
 
 LONGEST_WALK_S = 60.0
-START_TIMEOUT_S = 60.0  # of a slow or busy computer
 MODE_TIMEOUT_S = 30.0
-END_TIMEOUT_S = 15.0  # of one process, which is killed then
 POLL_S = 0.05
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 FINISH_M = 0.02  # before the end of the track
-
-
-def _prepare_child(blocked_before: set[int | signal.Signals]) -> None:
-    signal.pthread_sigmask(signal.SIG_SETMASK, blocked_before)
-    end_with_parent()
 
 
 class Demo:
     """Owns the two processes, the client, and the strides received so far."""
 
     def __init__(self, folder: Path, logs: Path, seed: int, world: Path | None = None) -> None:
-        self.folder = folder
         self.track: Track = load_world(world).track if world else paper_track()
-        self.configuration_path = write_local_setup(folder, logs)
-        self.output = (folder / "output.txt").open("w+", encoding="utf-8", errors="replace")
-        ground = () if world is None else ("--world", str(world))
-        self.robot = self._start("command_line.main", "simulate", "--seed", str(seed), *ground)
-        self.daemon = self._start("firmware_host.daemon")
+        self.processes = LocalRobot(folder, logs, seed, world)
         self._client: StatusClient | None = None
         self.strides: list[dict[str, Any]] = []
         self.walk_start_s = 0.0
         self.armed = False
 
-    def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
-        """Start a process in a session of its own.
-
-        Signals are blocked during the fork, in which Python drops the exception of a signal handler.
-        """
-        blocked_before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-        try:
-            return subprocess.Popen(
-                [sys.executable, "-P", "-m", module, *arguments, "--config", str(self.configuration_path)],
-                stdin=subprocess.DEVNULL,
-                stdout=self.output,
-                stderr=self.output,
-                start_new_session=True,
-                preexec_fn=partial(_prepare_child, blocked_before),  # noqa: PLW1509 - no threads here
-            )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked_before)
-
     def connect(self) -> None:
-        deadline_s = time.monotonic() + START_TIMEOUT_S
-        while time.monotonic() < deadline_s:
-            self._check_processes()
-            try:
-                self._client = StatusClient(self.folder / "mudskipper.sock")
-                return
-            except NoDaemonError:
-                time.sleep(POLL_S)
-        raise CommandError("the daemon does not answer")
+        self._client = self.processes.connect()
 
     def _call(self, method: str, **params: Any) -> Any:
         assert self._client is not None, "connect first"
         return self._client.call(method, **params)
 
-    def _check_processes(self) -> None:
-        for name, process in (("simulated robot", self.robot), ("daemon", self.daemon)):
-            if process.poll() is not None:
-                self.output.seek(0)
-                last = (["it printed nothing"] + self.output.read().strip().splitlines())[-1]
-                raise CommandError(f"the {name} ended with status {process.returncode}: {last}")
-
     def _wait_for(self, done: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """Return the first status that is `done`. Raises CommandError after MODE_TIMEOUT_S or at a fault."""
         deadline_s = time.monotonic() + MODE_TIMEOUT_S
         while time.monotonic() < deadline_s:
-            self._check_processes()
+            self.processes.check_processes()
             report: dict[str, Any] = self._call("status")
             if report["mode"] == "fault":
                 raise CommandError(f"fault: {report['fault']['message']}")
@@ -142,25 +92,16 @@ class Demo:
     def last_state(self) -> str:
         if not self.armed:
             return "stopped before torque was on"
-        if self.daemon.returncode == 0:
+        if self.processes.daemon.returncode == 0:
             return "stopped: torque is off, the log is closed"
-        return f"stopped, but the daemon ended with status {self.daemon.returncode}"
+        return f"stopped, but the daemon ended with status {self.processes.daemon.returncode}"
 
     def end(self) -> None:
         """End the daemon, which stops the robot, and then the robot. Further signals are ignored meanwhile."""
         handlers = {number: signal.signal(number, signal.SIG_IGN) for number in ENDING_SIGNALS}
         if self._client is not None:
             self._client.close()
-        for process in (self.daemon, self.robot):
-            if process.poll() is not None:
-                continue
-            process.send_signal(signal.SIGTERM)
-            try:
-                process.wait(END_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        self.output.close()
+        self.processes.end()
         for number, handler in handlers.items():
             signal.signal(number, handler)
 

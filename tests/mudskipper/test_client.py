@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import doctest
 from pathlib import Path
 
 import pytest
 
 import mudskipper
+from mudskipper import simulated_robot
+from tests.folders import ROOT
 from tests.mudskipper.test_examples import run_example
 from tests.running_bench import Bench
 
@@ -40,3 +43,25 @@ def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch:
     monkeypatch.setenv("MUDSKIPPER_SOCKET", str(bench.socket))
     with mudskipper.Client() as robot:
         assert robot.map() is not None and robot.check() and Path(robot.status()["log"]["path"]).exists()
+
+
+def test_the_example_of_simulate_runs_and_its_processes_end() -> None:
+    results = doctest.testmod(simulated_robot)
+    assert results.attempted == 2 and not results.failed
+
+
+@pytest.mark.parametrize("leaves", [RuntimeError, KeyboardInterrupt])
+def test_a_program_that_fails_leaves_no_robot_behind(leaves: type[BaseException]) -> None:
+    path = ROOT / "systemd/mudskipper.toml"
+    with pytest.raises(leaves), mudskipper.simulate(robot=path) as robot:
+        socket = Path(robot.status()["log"]["path"]).parents[2] / "mudskipper.sock"
+        assert socket.exists()
+        raise leaves
+    assert not socket.parent.exists()
+    with pytest.raises(mudskipper.NoDaemonError):
+        mudskipper.Client(socket)
+
+
+def test_a_world_that_cannot_be_is_refused_before_anything_starts() -> None:
+    with pytest.raises(mudskipper.ConfigurationError, match="segment"), mudskipper.simulate({"segment": []}):
+        pass

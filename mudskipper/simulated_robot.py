@@ -1,0 +1,75 @@
+"""Starts a simulated robot and its daemon for a program of one's own."""
+
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import read_text
+from mudskipper.client import POLL_S, Client
+from simulation.harness.local_robot import LocalRobot
+from simulation.harness.local_setup import local_copy
+from simulation.harness.world import load_world, parse_world
+
+READY_S = 30.0
+World = str | Path | Mapping[str, Any]
+
+
+@contextmanager
+def simulate(world: World | None = None, robot: str | Path | None = None, seed: int = 1) -> Iterator[Client]:
+    """Yield a Client of a simulated robot that is ready to arm, in real time; end its processes in any case.
+
+    `world` is a world file or its tables (default: three muds), `robot` the configuration of a robot, without its buses
+    and logs. Everything is in a temporary folder. Raises ConfigurationError and NoDaemonError.
+
+    >>> soft = {"segment": [{"start_m": 0.0, "end_m": 2.0, "strength_pa": 500.0}]}
+    >>> with simulate(soft) as client:
+    ...     client.arm()
+    ...     client.wait_for("hold")["mode"]
+    'hold'
+    """
+    folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
+    try:
+        logs, text = folder / "logs", ""
+        if robot is not None:
+            text = read_text(Path(robot))
+            parse_configuration(text, Path(robot))  # names the keys of the file itself
+            text = local_copy(text, folder, logs)
+        processes = LocalRobot(folder, logs, seed, _world_file(world, folder), text)
+        try:
+            processes.connect().close()
+            with Client(processes.socket) as client:
+                _await_ready(client, processes)
+                yield client
+        finally:
+            processes.end()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _world_file(world: World | None, folder: Path) -> Path | None:
+    """Return the checked file of a world. Raises ConfigurationError."""
+    if world is None:
+        return None
+    if isinstance(world, Mapping):
+        path = folder / "world.toml"
+        path.write_text(tomlkit.dumps(world), encoding="utf-8")
+        parse_world(path.read_text(encoding="utf-8"))
+        return path
+    load_world(Path(world))
+    return Path(world).absolute()
+
+
+def _await_ready(client: Client, processes: LocalRobot) -> None:
+    deadline_s = time.monotonic() + READY_S
+    while (report := client.status())["mode"] != "idle" or report["fault"]:
+        processes.check_processes()
+        if time.monotonic() > deadline_s:
+            raise TimeoutError(f"the simulated robot is not ready after {READY_S:g} s: {report['fault']}")
+        time.sleep(POLL_S)
