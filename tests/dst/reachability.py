@@ -5,7 +5,7 @@ The bounds of the promises follow from them. This module knows the schedule, not
 
 from __future__ import annotations
 
-from math import cos, radians
+from math import cos, inf, radians
 
 from control.records import JOINTS
 from drivers.fault_injection.failure_table import FailureKind
@@ -28,21 +28,21 @@ class Reachability:
         self._robot = robot
         self._failures = robot.lockstep.failures
         self._period_s = robot.loop.period_s
-        self._disturbed_s = [float("-inf")] * len(JOINTS)
-        self._foreign_s = [float("-inf")] * len(JOINTS)
-        self._late_s = float("-inf")
+        self._disturbed_s = [-inf] * len(JOINTS)
+        self._foreign_s = [-inf] * len(JOINTS)
+        self._late_s = -inf
         self._missed = robot.loop.missed_ticks
         drive = robot.loop.configuration.drive
         self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
         self._lags_s = self._current_lags_s()
-        self._hastened_s = [float("-inf")] * len(JOINTS)  # when a motor's current lost its lag
+        self._hastened_s = [-inf] * len(JOINTS)  # when a motor's current lost its lag
         self.stalled_s = 0.0  # since the start
         self.update()
 
     def update(self) -> None:
         """Call this before and after every tick.
 
-        A failure that the schedule has not ended lasts while the process stands still inside of a tick: the mechanics
+        A failure lasts until the schedule ends it, also while the process stands still inside of a tick: the mechanics
         are ahead of the tick then.
         """
         now_s = max(self._robot.now_s, self._robot.lockstep.robot.now_s)
@@ -58,11 +58,10 @@ class Reachability:
         self._lags_s = lags_s
         self.gains = [_gain(drive.parameters) for drive in self._robot.lockstep.robot.drives]
         for index, joint in enumerate(JOINTS):
-            if self._failures.failing and any(self._cuts(component) for component in self._paths[index]):
-                self._disturbed_s[index] = now_s
+            cut = self._failures.failing and any(self._cuts(component) for component in self._paths[index])
+            self._disturbed_s[index] = _last_s(self._disturbed_s[index], cut, now_s)
             own = [each.mode.component for each in self._robot.active if each.mode and each.joint == joint]
-            if MASTER in own:
-                self._foreign_s[index] = now_s
+            self._foreign_s[index] = _last_s(self._foreign_s[index], MASTER in own, now_s)
 
     def _current_lags_s(self) -> list[float]:
         return [drive.parameters.current_lag_s for drive in self._robot.lockstep.robot.drives]
@@ -77,7 +76,7 @@ class Reachability:
     def longest_s(self, index: int, ticks: int) -> float:
         """Return how long a motor may keep its torque after the loop has taken it away."""
         if self.is_foreign(index):
-            return float("inf")
+            return inf
         if self._recently(self._disturbed_s[index], WATCHDOG_S + AFTERMATH_S) or self._recently(
             self._late_s, WATCHDOG_S + AFTERMATH_S
         ):
@@ -87,7 +86,7 @@ class Reachability:
     def longest_idling_s(self, index: int) -> float:
         """Return how long a drive may stay in closed loop after the loop has commanded it idle."""
         if self._recently(self._disturbed_s[index], HEARTBEATS_S + REPEAT_S):
-            return float("inf")
+            return inf
         return HEARTBEATS_S + REPEAT_S
 
     def bunched_s(self, index: int) -> float:
@@ -102,6 +101,11 @@ class Reachability:
 
     def is_energised_by_others(self, index: int) -> bool:
         return self._recently(self._foreign_s[index], HEARTBEATS_S + REPEAT_S)
+
+
+def _last_s(before_s: float, lasts: bool, now_s: float) -> float:
+    """Return when a failure last was active: for ever while it is."""
+    return inf if lasts else min(before_s, now_s)
 
 
 def _gain(parameters: SimulatedDriveParameters) -> float:

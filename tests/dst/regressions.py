@@ -214,16 +214,19 @@ REGRESSIONS = (
     Regression(
         "the torque of another program was counted as ours after the loop stood still within a tick",
         Scenario(
-            seed=7320128,
-            surroundings=Surroundings(seed=0),
+            seed=7330031,
+            surroundings=Surroundings(seed=0, strength_pa=560, depth_m=0.035, drive_type="mit:AK80-6"),
             start="extraction",
             events=(
-                Suspend(at_s=0.169, for_s=0.036, inside="drives.send"),
                 Failure(
-                    at_s=0.17, component="left_sweep.master", kind="after every second command, unheard", for_s=0.017
+                    at_s=0.171,
+                    component="right_adduction.master",
+                    kind="after every second command, on the bus",
+                    for_s=0.2,
                 ),
+                Suspend(at_s=0.173, for_s=0.071, inside="bus.left"),
             ),
-            for_s=0.255,
+            for_s=0.45,
         ),
     ),
     Regression(
