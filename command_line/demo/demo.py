@@ -73,7 +73,7 @@ def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -
         demonstration.connect()
         print("Arming ...", flush=True)
         demonstration.arm()
-        muds = ", ".join(mud_text(segment.clay.name) for segment in demonstration.track.segments)
+        muds = ", ".join(mud_text(segment.ground.name) for segment in demonstration.track.segments)
         water = " water" if muds.endswith("%") else ""
         print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds}{water}.\n")
         print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
@@ -112,7 +112,7 @@ def summarise(report: Report, demonstration: Demo, log_path: Path, plot_path: Pa
     strides = []
     for stride in demonstration.strides:
         start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(walked) else 0.0
-        strides.append(stride | {"mud": track.clay_at(start_m + LEAD_M).name})
+        strides.append(stride | {"mud": track.ground_at(start_m + LEAD_M).name})
     return {
         **report["loop"],
         "strides": strides,
@@ -134,7 +134,7 @@ def speeds_cm_s(
     for segment in track.segments:
         first, last = (int(row) for row in np.searchsorted(reached_m, (start_m, segment.end_m)))
         last = min(last, len(reached_m) - 1)
-        name = segment.clay.name
+        name = segment.ground.name
         if name in speeds:  # the same mud again
             name = f"{name} at {start_m:.2f} m"
         speeds[name] = None

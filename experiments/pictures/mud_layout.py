@@ -59,7 +59,7 @@ def layout_of_lengths(muds: Sequence[tuple[str, float]]) -> MudLayout:
 def layout_of_track(track: Track) -> MudLayout:
     """Return the layout of a simulated track, the last mud of which has no end."""
     *borders_m, _ = [segment.end_m for segment in track.segments]
-    return MudLayout(tuple(segment.clay.name for segment in track.segments), (*borders_m, inf))
+    return MudLayout(tuple(segment.ground.name for segment in track.segments), (*borders_m, inf))
 
 
 def mud_regions(walk: RecordedWalk, layout: MudLayout | None) -> list[MudRegion]:

@@ -86,7 +86,7 @@ def walk_by(
     lockstep = Lockstep(robot, track, seed, disturbances=TRACKWAY, plant=plant_of(robot, TRACKWAY, **plant))
     lockstep.arm()
     lockstep.walk(WalkOrder(robot.adaptation.initial_depth_m if method else depth_m, adaptive=bool(method)))
-    record = StrideRecord(lambda position_m: track.clay_at(position_m).name)
+    record = StrideRecord(lambda position_m: track.ground_at(position_m).name)
     while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
         lockstep.step()
         record.update(tick_of(lockstep))

@@ -56,9 +56,9 @@ def _stiffness(
     """Return k of F = k V or τ = k Φ in a stroke down (sign 1) or up (sign -1), by least squares from the surface."""
     if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
         return None
-    cell: LoadCell | JointCell = JointCell(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, relaxation)
+    cell: LoadCell | JointCell = JointCell(stride.ground, geometry, stroke.sweep_rad, stride.surface_m, relaxation)
     if upright:
-        cell = LoadCell(stride.clay, geometry, 0.0, 0.0, relaxation)
+        cell = LoadCell(stride.ground, geometry, 0.0, 0.0, relaxation)
     down, up = measure_stroke(cell, stroke.deepest_m, stroke.speed_m_s, hold_s)
     fitted_m = stroke.deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * stroke.deepest_m
     rows = [row for row in (down if sign > 0.0 else up) if 0.0 < row[0] <= fitted_m]
@@ -72,6 +72,6 @@ def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> flo
         return None
     speed_m_s = stroke.speed_m_s if isfinite(stroke.speed_m_s) else PAPER_SPEED_M_S
     adduction_rad = 0.0 if upright else stroke.adduction_rad
-    force_n = measure_shear(stride.clay, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_PATH_M)
+    force_n = measure_shear(stride.ground, geometry, 0.0, adduction_rad, stroke.mean_depth_m, speed_m_s, SHEAR_PATH_M)
     across = submerged_part(geometry, stroke.mean_depth_m, -sin(adduction_rad), cos(adduction_rad))
     return force_n / across.depth_moment_m3

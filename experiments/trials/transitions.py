@@ -27,7 +27,7 @@ def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], Truth]) -> lis
     transitions: list[dict[str, Any]] = []
     for flipper in trial.configuration.rig.flippers:
         strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
-        by_mud = [(mud, [*own]) for mud, own in groupby(strides, key=lambda stride: stride.clay.name)]
+        by_mud = [(mud, [*own]) for mud, own in groupby(strides, key=lambda stride: stride.ground.name)]
         for (before, _), (after, own) in pairwise(by_mud):
             close = [_is_close(stride, truths, estimates) for stride in own]
             followed = close.index(True) + 1 if True in close else None

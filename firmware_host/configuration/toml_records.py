@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import (
@@ -170,6 +171,8 @@ def _checked_hint(hint: Any) -> Any:
         return _checked_tuple(get_args(hint))
     if get_origin(hint) is list:
         return list[_checked_hint(get_args(hint)[0])]  # type: ignore[misc]
+    if get_origin(hint) is UnionType:
+        return Union[tuple(map(_checked_hint, get_args(hint)))]  # noqa: UP007
     if not (is_dataclass(hint) and isinstance(hint, type)):
         return hint
     return Annotated[_model_of(hint), AfterValidator(lambda checked: hint(**dict(checked)))]

@@ -38,8 +38,9 @@ from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import FLIPPERS, TWO_FLIPPERS, Rig
 from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.mud.carriage import Carriage, Vector, cross, dot, plate_directions
-from simulation.mud.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
+from simulation.mud.clay import UNIT_WEIGHT_N_M3
 from simulation.mud.flipper_contact import NO_CONTACT
+from simulation.mud.ground_contact import Ground
 from simulation.mud.track import Track
 
 YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
@@ -135,12 +136,12 @@ class BellyQuarter:
         self._print_m = self._stiffness_n_m = 0.0
         self.pressed = False
 
-    def step(self, clay: Clay, traction: float, depth_m: float, sinking_m_s: float) -> float:
+    def step(self, ground: Ground, traction: float, depth_m: float, sinking_m_s: float) -> float:
         """Return the force up. The damping is half of critical."""
         if depth_m <= 0.0:
             self.reset()
             return 0.0
-        slow_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.area_m2
+        slow_n = ground.bearing_pa(depth_m) * self.area_m2
         stiffness_n_m = min(slow_n / YIELD_M, self.mass_kg * LARGEST_RAD_S**2)
         elastic_n = min(stiffness_n_m * self._strain_m(stiffness_n_m, depth_m), traction * slow_n)
         floating_n = UNIT_WEIGHT_N_M3 * self.area_m2 * depth_m
@@ -244,15 +245,17 @@ class FreeBody:
         sticking_n = 0.0
         for quarter, corner in zip(self._quarters, self._corners, strict=True):
             corner_m = in_world(axes, corner)
-            clay = self.track.clay_at(self.forward_m + corner_m[0])
+            ground = self.track.ground_at(self.forward_m + corner_m[0])
+            depth_m = -self.height_m - corner_m[2]
             _, rising_m_s = self._speeds_m_s(axes, corner_m)
-            traction = rate_factor(hypot(sliding_m_s, rising_m_s))
-            upward_n = quarter.step(clay, traction, -self.height_m - corner_m[2], -rising_m_s)
+            traction = ground.rate_factor(hypot(sliding_m_s, rising_m_s))
+            upward_n = quarter.step(ground, traction, depth_m, -rising_m_s)
             yield load_at(axes, corner_m, 0.0, upward_n)
             if quarter.pressed:
-                sticking_n += ADHESION * clay.strength_pa * quarter.area_m2
-        pad_n = self.pad.yield_n(self.track.clay_at(self.forward_m), -self.height_m - lever_m[2])
-        largest_n = rate_factor(abs(sliding_m_s)) * (sticking_n + pad_n)
+                sticking_n += ground.sticking_pa(depth_m) * quarter.area_m2
+        ground = self.track.ground_at(self.forward_m)
+        pad_n = self.pad.yield_n(ground, -self.height_m - lever_m[2])
+        largest_n = ground.rate_factor(abs(sliding_m_s)) * (sticking_n + pad_n)
         yield load_at(axes, lever_m, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0)
 
     def _speeds_m_s(self, axes: Axes, lever_m: Vector) -> tuple[float, float]:

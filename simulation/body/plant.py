@@ -44,7 +44,6 @@ class Arm:
     def __init__(self, parameters: PlantParameters, track: Track, seed: int, trial_surface_m: float = 0.0) -> None:
         self.parameters = parameters
         self.track = track
-        self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
         self.history = StrokeHistory(parameters.disturbances, seed, trial_surface_m)
         self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
@@ -53,11 +52,12 @@ class Arm:
 
     def reset(self) -> None:
         """Put the arm at rest with the plate's edge on the mud, as a robot lies when its motors are off."""
+        self.contact = FlipperContact(self.parameters.geometry, self.parameters.disturbances.relaxation)
         self.history.reset()
         self.relief_m = self.track.surface_m(0.0)  # depth of the track's own surface, without earlier strokes
         self.put_back()
         self.force = NO_CONTACT
-        self.clay = self.track.clay_at(0.0)
+        self.ground = self.track.ground_at(0.0)
 
     def put_back(self) -> None:
         """Move the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
@@ -97,7 +97,7 @@ class Arm:
         motion = ArmMotion(sweep_rad, adduction_rad, *rates, body_m_s)
         surface_m = self.surface_m
         below = attitude.below(surface_m) if surface_m else attitude
-        self.force = self.contact.step(dt_s, self.clay, motion, below, carriage)
+        self.force = self.contact.step(dt_s, self.ground, motion, below, carriage, edge_m)
         if self.stones:
             self._meet_stones(self.stones, dt_s, edge_m, attitude)
         load_sweep_nm, load_lift_nm = self._load_nm()
@@ -121,17 +121,17 @@ class Arm:
         self._move(dt_s, sweep_nm, lift_nm, *mount.inertias_kg_m2(mass))
 
     def _meet_mud(self, edge_m: float, attitude: Attitude) -> None:
-        """Find the clay under the flipper, its remaining firmness after earlier strokes, and its height."""
+        """Find the ground under the flipper, its remaining firmness after earlier strokes, and its height."""
         self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            deepest_m = lowest_point_m(attitude, self.contact.plate.size)
+            deepest_m = lowest_point_m(attitude, self.contact.size)
             self.history.step(deepest_m - self.relief_m, edge_m)
-        clay, firmness = self.track.clay_at(edge_m), self.history.firmness
-        self.clay = clay if firmness == 1.0 else clay.scaled(firmness)
+        ground, firmness = self.track.ground_at(edge_m), self.history.firmness
+        self.ground = ground if firmness == 1.0 else ground.scaled(firmness)
 
     def _meet_stones(self, stones: StoneContact, dt_s: float, edge_m: float, attitude: Attitude) -> None:
         geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
-        push = stones.step(dt_s, edge_m, lowest_point_m(attitude, self.contact.plate.size))
+        push = stones.step(dt_s, edge_m, lowest_point_m(attitude, self.contact.size))
         if push is not NO_PUSH:
             pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
             self.force = ContactForce(*map(add, self.force, pushed))

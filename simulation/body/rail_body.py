@@ -9,8 +9,8 @@ from typing import NamedTuple, Protocol
 
 from control.records import TWO_FLIPPERS, Rig
 from simulation.mud.carriage import Carriage, Vector
-from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.flipper_contact import ContactForce
+from simulation.mud.ground_contact import Ground
 from simulation.mud.track import Track
 
 DRAG_STIFFNESS_N_M = 5000.0
@@ -80,10 +80,10 @@ class DragPad(NamedTuple):
     width_m: float
     depth_m: float
 
-    def yield_n(self, clay: Clay, deeper_m: float = 0.0) -> float:
+    def yield_n(self, ground: Ground, deeper_m: float = 0.0) -> float:
         """Return the yield force at the reference speed, with the body `deeper_m` below the mud's surface."""
         depth_m = self.depth_m + deeper_m
-        return clay.lateral_n(depth_m, self.width_m) if self.width_m and depth_m > 0.0 else 0.0
+        return ground.lateral_n(depth_m, self.width_m) if self.width_m and depth_m > 0.0 else 0.0
 
 
 class RailBody:
@@ -105,7 +105,7 @@ class RailBody:
         self.pad = pad
         self.track = track
         self._drag = DryDrag()
-        self._pad_clay: Clay | None = None  # for which `_pad_n` was computed
+        self._pad_ground: Ground | None = None  # for which `_pad_n` was computed
         self._pad_n = 0.0
         self.reset()
 
@@ -121,10 +121,10 @@ class RailBody:
         thrust_n = 0.0
         for flipper in flippers:
             thrust_n += flipper.force.thrust_n
-        clay = self.track.clay_at(self.forward_m)
-        if clay is not self._pad_clay:
-            self._pad_clay, self._pad_n = clay, self.pad.yield_n(clay)
-        largest_n = self.rail_drag_n + rate_factor(abs(self.forward_m_s)) * self._pad_n
+        ground = self.track.ground_at(self.forward_m)
+        if ground is not self._pad_ground:
+            self._pad_ground, self._pad_n = ground, self.pad.yield_n(ground)
+        largest_n = self.rail_drag_n + ground.rate_factor(abs(self.forward_m_s)) * self._pad_n
         drag_n = self._drag.step(dt_s, self.forward_m_s, largest_n) - self.rail_damping_n_s_m * self.forward_m_s
         self.forward_m_s += dt_s * (thrust_n + drag_n) / self.mass_kg
         self.forward_m += dt_s * self.forward_m_s

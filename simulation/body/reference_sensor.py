@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from control.records import TWO_FLIPPERS, UNKNOWN, Phase, Rig
 from simulation.body.plant import Arm, Plant
-from simulation.mud.clay import Clay
+from simulation.mud.ground_contact import Ground
 
 SLIPPING_M_S = 0.02  # slower motion is the mud's elastic yield
 STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
@@ -34,7 +34,7 @@ class StrokeTruth(NamedTuple):
 class StrideTruth:
     flipper: str
     index: int  # counts complete strides from 0
-    clay: Clay  # with the firmness that earlier strokes left, when the flipper came in
+    ground: Ground  # with the firmness that earlier strokes left, when the flipper came in
     surface_m: float  # below its nominal height
     insertion: StrokeTruth
     stance: StrokeTruth
@@ -111,7 +111,7 @@ class FlipperReference:
     def reset(self) -> None:
         for sums in self._sums.values():
             sums.reset()
-        self._entered: tuple[Clay, float] | None = None
+        self._entered: tuple[Ground, float] | None = None
 
     def update(self, dt_s: float, arm: Arm, body_m_s: float, phase: Phase) -> None:
         sums = self._sums.get(phase)
@@ -120,12 +120,12 @@ class FlipperReference:
         snapshot = snapshot_of(arm, body_m_s)
         sums.update(dt_s, snapshot)
         if self._entered is None and snapshot.depth_m > 0.0:
-            self._entered = (arm.clay, arm.surface_m)
+            self._entered = (arm.contact.plate.as_met(arm.ground), arm.surface_m)
 
     def truth(self, index: int, arm: Arm) -> StrideTruth:
-        clay, surface_m = self._entered or (arm.clay, arm.surface_m)
+        ground, surface_m = self._entered or (arm.ground, arm.surface_m)
         insertion, stance, extraction = (self._sums[phase].truth() for phase in STROKES)
-        return StrideTruth(self.flipper, index, clay, surface_m, insertion, stance, extraction)
+        return StrideTruth(self.flipper, index, ground, surface_m, insertion, stance, extraction)
 
 
 class StrokeReference:

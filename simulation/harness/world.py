@@ -8,7 +8,7 @@ because the daemon knows these and does not know the world.
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from control.bounds import Bounds
 from firmware_host.configuration.configuration import Configuration
@@ -26,12 +26,17 @@ from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import FIXED_OF_DRIVE, drives_of, plant_of
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, clay_of_water
 from simulation.mud.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
+from simulation.mud.ground_contact import Ground
+from simulation.mud.grounds.sand import Sand
+from simulation.mud.grounds.thixotropic_mud import ThixotropicMud
+from simulation.mud.grounds.thixotropy import Thixotropy
 from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, UNIFORM, Track
 from simulation.mud.unevenness import RandomStrength, Ridges
 
 STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's stiffest mud
+PAVLOV_N_M3 = 1.55e6  # fits plates that were pushed into dry sand (Pavlov 2022)
 SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"rig", "geometry", "arm_mass", "disturbances", "fixed_base"})
@@ -61,13 +66,16 @@ class World:
 
 @dataclass(frozen=True)
 class SegmentText:
-    """One stretch of the track, with its water content or its strength."""
+    """One stretch of the track: mud by its water content or its strength, or dry sand."""
 
     start_m: Annotated[float, Bounds(0.0, 1000.0)]
     end_m: Annotated[float, Bounds(0.0, 1000.0)]
     water_percent: Annotated[float | None, Bounds(DRIEST_PERCENT, WETTEST_PERCENT)] = None
     strength_pa: Annotated[float | None, Bounds(50.0, STRONGEST_PA)] = None
+    sand: Literal["generic", "spatial"] | None = None
+    stiffness_n_m3: Annotated[float, Bounds(1e4, 5e6)] = PAVLOV_N_M3  # of the sand
     layer: list[Layer] = field(default_factory=list)
+    thixotropy: Thixotropy | None = None
 
     @property
     def clay(self) -> Clay:
@@ -76,6 +84,12 @@ class SegmentText:
             assert self.water_percent is not None
             return clay_of_water(self.water_percent)._replace(layers=tuple(self.layer))
         return Clay(f"{self.strength_pa:g} Pa", self.strength_pa, tuple(self.layer))
+
+    @property
+    def ground(self) -> Ground:
+        if self.sand:
+            return Sand(f"{self.sand} sand", self.stiffness_n_m3, self.sand == "spatial")
+        return ThixotropicMud(self.clay, self.thixotropy) if self.thixotropy else self.clay
 
 
 @dataclass(frozen=True)
@@ -92,7 +106,7 @@ class WorldText:
 
     @property
     def world(self) -> World:
-        segments = [(segment.end_m - segment.start_m, segment.clay) for segment in self.segment]
+        segments = [(segment.end_m - segment.start_m, segment.ground) for segment in self.segment]
         track = Track(segments, self.stone, self.ridges, self.random_strength)
         return World(track, self.disturbances, self.robot, self.drives)
 
@@ -144,9 +158,13 @@ def _contradictions(text: WorldText) -> Iterator[str]:
 
 
 def _mud_problems(key: str, segment: SegmentText) -> Iterator[str]:
-    water, strength = segment.water_percent, segment.strength_pa
-    if water is None and strength is None:
-        yield f"{key}: water_percent or strength_pa is missing"
+    water, strength, sand = segment.water_percent, segment.strength_pa, segment.sand
+    if sand:
+        for name in ("water_percent", "strength_pa", "layer", "thixotropy"):
+            if getattr(segment, name):
+                yield f"{key}.{name}: cannot be combined with sand = {shown(sand)}; remove one of them"
+    elif water is None and strength is None:
+        yield f"{key}: water_percent, strength_pa or sand is missing"
     elif water is None or strength is None:
         yield from _layer_problems(key, segment.layer, segment.clay.strength_pa)
     else:

@@ -47,10 +47,11 @@ def plate_directions(sweep_rad: float, adduction_rad: float) -> tuple[Vector, Ve
 def carried_attitude(
     geometry: FlipperGeometry, carriage: Carriage, sweep_rad: float, adduction_rad: float, surface_m: float
 ) -> Attitude:
-    _, outward, upward = plate_directions(sweep_rad, adduction_rad)
+    normal, outward, upward = plate_directions(sweep_rad, adduction_rad)
     edge = geometry.edge_position(sweep_rad, adduction_rad)
     depth_m = -carriage.height_m - dot(carriage.up, edge) - surface_m
-    return Attitude(depth_m, -dot(carriage.up, outward), max(dot(carriage.up, upward), LEAST_UPRIGHT))
+    upright = max(dot(carriage.up, upward), LEAST_UPRIGHT)
+    return Attitude(depth_m, -dot(carriage.up, outward), upright, -dot(carriage.up, normal))
 
 
 def carried_twist(

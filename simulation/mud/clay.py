@@ -70,6 +70,19 @@ class Clay(NamedTuple):
                 return layer.factor * self.strength_pa
         return self.strength_pa
 
+    def bearing_pa(self, depth_m: float) -> float:
+        """Return the pressure under a level area that is pressed down."""
+        return BEARING_FACTOR * self.strength_at_pa(depth_m)
+
+    def sticking_pa(self, depth_m: float) -> float:
+        """Return the shear along a level area that is dragged, which is that of the clay without its layers."""
+        return ADHESION * self.strength_pa
+
+    @staticmethod
+    def rate_factor(speed_m_s: float) -> float:
+        """Return g(v): faster is stronger."""
+        return rate_factor(speed_m_s)
+
     def mean_strength_pa(self, from_m: float, to_m: float) -> float:
         """Return the mean strength between two depths."""
         fraction = 1.0

@@ -1,4 +1,4 @@
-"""One flipper in clay: the motion of its joints as the plate's motion, and the plate's forces as torques and thrust.
+"""One flipper in the ground: the motion of its joints as the plate's, and the plate's forces as torques and thrust.
 
 The plate hangs under the arm, normal n in the direction of the sweep, in-plane directions r (outward along the arm)
 and s (up along the plate). In the frame that tilts with adduction, the point u outward and s up from the middle of
@@ -16,6 +16,10 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from simulation.mud.carriage import Carriage, carried_attitude, carried_twist
 from simulation.mud.clay import Clay
+from simulation.mud.ground_contact import Ground, GroundContact
+from simulation.mud.grounds.sand import Sand
+from simulation.mud.grounds.sand_contact import SandContact
+from simulation.mud.grounds.thixotropic_mud import ThixotropicContact, ThixotropicMud
 from simulation.mud.plate_contact import PlateContact
 from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench
 
@@ -61,7 +65,8 @@ def attitude_of(
     if carriage is not None:
         return carried_attitude(geometry, carriage, sweep_rad, adduction_rad, surface_m)
     depth_m = geometry.depth_m(sweep_rad, adduction_rad) - surface_m
-    return Attitude(depth_m, -cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad))
+    lean = sin(adduction_rad)
+    return Attitude(depth_m, -cos(sweep_rad) * lean, cos(adduction_rad), sin(sweep_rad) * lean)
 
 
 def twist_of(geometry: FlipperGeometry, motion: ArmMotion) -> Twist:
@@ -97,22 +102,41 @@ def contact_force(geometry: FlipperGeometry, sweep_rad: float, wrench: Wrench) -
     )
 
 
+def contact_of(ground: Ground, size: PlateSize, relaxation: float = 0.0) -> GroundContact:
+    """Make a plate's contact with a kind of ground; `relaxation` is that of clay."""
+    if isinstance(ground, Sand):
+        return SandContact(size)
+    return ThixotropicContact(size) if isinstance(ground, ThixotropicMud) else PlateContact(size, relaxation)
+
+
 class FlipperContact:
-    """Owns the contact of one flipper's plate."""
+    """Owns the contact of one flipper's plate, a new one where the kind of ground changes."""
 
     def __init__(self, geometry: FlipperGeometry, relaxation: float = 0.0) -> None:
         self.geometry = geometry
-        self.plate = PlateContact(plate_size(geometry), relaxation)
+        self.size = plate_size(geometry)
+        self.relaxation = relaxation
+        self.plate: GroundContact = PlateContact(self.size, relaxation)
+        self._kind: type[Ground] = Clay
 
     def reset(self) -> None:
         self.plate.reset()
 
     def step(
-        self, dt_s: float, clay: Clay, motion: ArmMotion, attitude: Attitude, carriage: Carriage | None = None
+        self,
+        dt_s: float,
+        ground: Ground,
+        motion: ArmMotion,
+        attitude: Attitude,
+        carriage: Carriage | None = None,
+        edge_m: float = 0.0,
     ) -> ContactForce:
-        """`attitude`: of the plate in its mud, below the surface that this flipper meets."""
-        if self.plate.leaves(attitude):  # as in swing: nothing else to compute
+        """`attitude`: of the plate in its ground, below the surface that this flipper meets, at `edge_m` along it."""
+        if type(ground) is not self._kind:
+            self._kind, self.plate = type(ground), contact_of(ground, self.size, self.relaxation)
+        if self.plate.leaves(dt_s, attitude):  # as in swing: nothing else to compute
             return NO_CONTACT
         geometry = self.geometry
         twist = twist_of(geometry, motion) if carriage is None else carried_twist(geometry, carriage, *motion[:4])
-        return contact_force(geometry, motion.sweep_rad, self.plate.press(dt_s, clay, attitude, twist))
+        wrench = self.plate.press(dt_s, ground, attitude, twist, edge_m)
+        return contact_force(geometry, motion.sweep_rad, wrench)

@@ -47,7 +47,7 @@ Strip = tuple[float, float, float, float]
 
 def submerged_strips(step: PlateStep, outward_m: float, foot_m: float, strip_m: float) -> list[Strip]:
     """Return the strips in the mud of a column whose foot is `outward_m` outward, at the height `foot_m`."""
-    clay, (depth_m, per_outward, per_upward) = step.clay, step.attitude
+    clay, (depth_m, per_outward, per_upward, _) = step.clay, step.attitude
     submerged_m = (depth_m + per_outward * outward_m) / per_upward - foot_m
     strips, strength_pa, layers = [], clay.strength_pa, clay.layers
     for strip in range(STRIPS):
@@ -123,8 +123,9 @@ class PressedColumn(Springs):
 class RubbedColumn(Springs):
     """The mud that sticks to a column: its strain is a vector in the plate's plane, outward + i upward."""
 
-    def __init__(self) -> None:
+    def __init__(self, yield_m: float) -> None:
         super().__init__(STRIPS)
+        self.yield_m = yield_m
 
     def reset(self) -> None:
         super().reset()
@@ -141,7 +142,7 @@ class RubbedColumn(Springs):
         `breadth_m`: of all surfaces that mud sticks to.
         """
         dt_s, clay, rate, _, _ = step
-        layered, per_yield = bool(clay.layers), dt_s / LENGTHWAYS_YIELD_M
+        layered, per_yield = bool(clay.layers), dt_s / self.yield_m
         sticking_n_m = ADHESION * clay.strength_pa * breadth_m
         moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
         strains, limits_n = self._strains, self._limits_n
@@ -167,9 +168,10 @@ class RubbedColumn(Springs):
 class LowerEdge(Springs):
     """The mud under the two halves of the lower edge, which yields at the bearing force."""
 
-    def __init__(self, thickness_m: float) -> None:
+    def __init__(self, thickness_m: float, yield_m: float) -> None:
         super().__init__(2)
         self.thickness_m = thickness_m
+        self.yield_m = yield_m
 
     def step(
         self, step: PlateStep, positions_m: tuple[float, float], depths_m: tuple[float, float], wet_m: float
@@ -185,7 +187,7 @@ class LowerEdge(Springs):
             fraction, before_n = fractions[half], limits_n[half]
             if limit_n > before_n:
                 fraction *= before_n / limit_n
-            fraction = min(max(fraction - moved_m / LENGTHWAYS_YIELD_M, -suction * rate), rate)
+            fraction = min(max(fraction - moved_m / self.yield_m, -suction * rate), rate)
             fractions[half], limits_n[half] = fraction, limit_n
             force_n += fraction * limit_n
             moment_nm += fraction * limit_n * outward_m

@@ -17,9 +17,10 @@ and along are independent. Lean, cross-coupling and lateral pull follow from the
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
 """
 
-from math import exp, sqrt
+from math import exp
 
 from simulation.mud.clay import Clay, rate_factor
+from simulation.mud.ground_contact import GroundContact
 from simulation.mud.mud_springs import (
     LENGTHWAYS_YIELD_M,
     SIDEWAYS_YIELD_M,
@@ -32,7 +33,7 @@ from simulation.mud.mud_springs import (
     submerged_strips,
 )
 from simulation.mud.plate_panels import GAUSS, Panel, panels_of, sides_m
-from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m
+from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench, speed_of_edge_m_s
 
 RELAXATION_S = 0.2
 RESTING_M_S = 0.002
@@ -42,13 +43,13 @@ WAKING_M = 0.001
 class PanelContact:
     """Owns the mud on one panel: two columns of both faces, and the lower edge."""
 
-    def __init__(self, size: PlateSize, panel: Panel, side_m: float) -> None:
+    def __init__(self, size: PlateSize, panel: Panel, side_m: float, reach: float) -> None:
         """`side_m`: thickness of the narrow side that a column counts."""
         self.panel = panel
         self._side_m = side_m
-        self._pressed = [PressedColumn(size.width_m, SIDEWAYS_YIELD_M) for _ in range(2)]
-        self._rubbed = [RubbedColumn() for _ in range(2)]
-        self._edge = LowerEdge(size.thickness_m)
+        self._pressed = [PressedColumn(size.width_m, reach * SIDEWAYS_YIELD_M) for _ in range(2)]
+        self._rubbed = [RubbedColumn(reach * LENGTHWAYS_YIELD_M) for _ in range(2)]
+        self._edge = LowerEdge(size.thickness_m, reach * LENGTHWAYS_YIELD_M)
         self.parts: tuple[Springs, ...] = (*self._pressed, *self._rubbed, self._edge)
 
     def step(self, step: PlateStep) -> tuple[float, ...]:
@@ -74,18 +75,20 @@ class PanelContact:
         return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
 
 
-class PlateContact:
-    """Owns the contact of one plate, and how far the mud around it has come to rest."""
+class PlateContact(GroundContact):
+    """Owns the contact of one plate with clay, and how far the clay around it has come to rest."""
 
-    def __init__(self, size: PlateSize, relaxation: float = 0.0) -> None:
-        self.size = size
+    def __init__(self, size: PlateSize, relaxation: float = 0.0, reach: float = 1.0) -> None:
+        """`reach`: factor of the distances over which the clay yields."""
+        super().__init__(size)
+        yield_m = reach * LENGTHWAYS_YIELD_M
         self.relaxation = relaxation
         self._strip_m = size.height_m / STRIPS
         side_m = 0.0 if size.corners_m else size.thickness_m  # a rectangle's columns count its narrow sides
-        self._panels = [PanelContact(size, panel, side_m) for panel in panels_of(size)]
+        self._panels = [PanelContact(size, panel, side_m, reach) for panel in panels_of(size)]
         self._sides_m = sides_m(size, STRIPS)
-        self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, LENGTHWAYS_YIELD_M) for _ in range(2))
-        self._rubbed_sides = [(RubbedColumn(), side_m) for side_m in self._sides_m] if size.corners_m else []
+        self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, yield_m) for _ in range(2))
+        self._rubbed_sides = [(RubbedColumn(yield_m), side_m) for side_m in self._sides_m] if size.corners_m else []
         self._parts: tuple[Springs, ...] = (
             *(part for panel in self._panels for part in panel.parts),
             self._inner_side,
@@ -95,31 +98,19 @@ class PlateContact:
         self.reset()
 
     def reset(self) -> None:
+        super().reset()
         for part in self._parts:
             part.reset()
         self._rested = 0.0
-        self._touched = False
 
-    def leaves(self, attitude: Attitude) -> bool:
-        """Return whether the plate is clear of the mud; the mud then forgets it."""
-        if lowest_point_m(attitude, self.size) > 0.0:
-            return False
-        if self._touched:
-            self.reset()
-        return True
-
-    def step(self, dt_s: float, clay: Clay, attitude: Attitude, twist: Twist) -> Wrench:
-        return NO_WRENCH if self.leaves(attitude) else self.press(dt_s, clay, attitude, twist)
-
-    def press(self, dt_s: float, clay: Clay, attitude: Attitude, twist: Twist) -> Wrench:
-        """Step a plate that does not leave the mud."""
+    def press(self, dt_s: float, ground: Clay, attitude: Attitude, twist: Twist, edge_m: float = 0.0) -> Wrench:
         self._touched = True
-        speed_m_s = sqrt(twist.normal_m_s**2 + twist.outward_m_s**2 + twist.upward_m_s**2)
+        speed_m_s = speed_of_edge_m_s(twist)
         if self.relaxation:
             self._relax(dt_s, speed_m_s)
-        return self._wrench(PlateStep(dt_s, clay, rate_factor(speed_m_s), attitude, twist))
+        return self.wrench(PlateStep(dt_s, ground, rate_factor(speed_m_s), attitude, twist))
 
-    def _wrench(self, step: PlateStep) -> Wrench:
+    def wrench(self, step: PlateStep) -> Wrench:
         """Return the sum over all pieces."""
         parts = [panel.step(step) for panel in self._panels]
         parts += [self._rub_side(step, side, outward_m) for side, outward_m in self._rubbed_sides]
@@ -136,6 +127,9 @@ class PlateContact:
             return
         self._rested += (1.0 - before) * (1.0 - exp(-dt_s / RELAXATION_S))
         remaining = (1.0 - self.relaxation * self._rested) / (1.0 - self.relaxation * before)
+        self.fade(remaining)
+
+    def fade(self, remaining: float) -> None:
         for part in self._parts:
             part.fade(remaining)
 

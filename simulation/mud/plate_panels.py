@@ -34,7 +34,7 @@ class Panel(NamedTuple):
         return self.length_m + self.length_slope * outward_m
 
     def foot_depth_m(self, attitude: Attitude, outward_m: float) -> float:
-        depth_m, per_outward, per_upward = attitude
+        depth_m, per_outward, per_upward, _ = attitude
         return depth_m + per_outward * outward_m - per_upward * self.foot_at_m(outward_m)
 
     def wet_part_m(self, attitude: Attitude) -> tuple[float, float]:

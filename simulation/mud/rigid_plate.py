@@ -6,6 +6,7 @@ lower edge is the point that everything is counted from.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 
@@ -19,15 +20,26 @@ class PlateSize(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """How deep the plate is: the middle of its lower edge, and how depth changes outward and (as a loss) upward."""
+    """How deep the plate is: the middle of its lower edge, and how depth changes outward, (as a loss) upward and along
+    the normal.
+    """
 
     depth_m: float
     per_outward: float
     per_upward: float
+    per_normal: float = 0.0  # of an upright plate
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The world's vertical along the plate's axes."""
+        return -self.per_normal, -self.per_outward, self.per_upward
+
+    def depth_at_m(self, outward_m: float, upward_m: float) -> float:
+        return self.depth_m + self.per_outward * outward_m - self.per_upward * upward_m
 
     def below(self, surface_m: float) -> Attitude:
         """Count depth from a surface that lies `surface_m` lower."""
-        return Attitude(self.depth_m - surface_m, self.per_outward, self.per_upward)
+        return Attitude(self.depth_m - surface_m, self.per_outward, self.per_upward, self.per_normal)
 
 
 def lowest_point_m(attitude: Attitude, size: PlateSize) -> float:
@@ -47,6 +59,10 @@ class Twist(NamedTuple):
     normal_per_upward_s: float = 0.0
     outward_per_upward_s: float = 0.0
     upward_per_outward_s: float = 0.0
+
+
+def speed_of_edge_m_s(twist: Twist) -> float:
+    return sqrt(twist.normal_m_s**2 + twist.outward_m_s**2 + twist.upward_m_s**2)
 
 
 class Wrench(NamedTuple):

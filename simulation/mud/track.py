@@ -1,4 +1,4 @@
-"""The ground along the track: segments of mud, the last of which has no end, and their unevenness.
+"""The ground along the track: segments of mud or sand, the last of which has no end, and their unevenness.
 
     ridges             the surface is A sin(2 π x / λ) above its nominal height
     random strength    log-normal about each segment's own, with the standard deviation `relative_spread` times the
@@ -14,7 +14,8 @@ from math import exp, log, pi, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
-from simulation.mud.clay import MUDS, Clay
+from simulation.mud.clay import MUDS
+from simulation.mud.ground_contact import Ground
 from simulation.mud.stones import Stone
 from simulation.mud.unevenness import RandomStrength, Ridges
 
@@ -27,7 +28,7 @@ UNIFORM = RandomStrength()
 
 class Segment(NamedTuple):
     end_m: float
-    clay: Clay
+    ground: Ground
 
 
 class StrengthChain:
@@ -61,17 +62,17 @@ class StrengthChain:
 class Track:
     def __init__(
         self,
-        segments: Sequence[tuple[float, Clay]],
+        segments: Sequence[tuple[float, Ground]],
         stones: Sequence[Stone] = (),
         ridges: Ridges = LEVEL,
         random_strength: RandomStrength = UNIFORM,
     ) -> None:
-        """`segments`: (length in metres, clay) from the start."""
+        """`segments`: (length in metres, ground) from the start."""
         end_m = 0.0
         self.segments: list[Segment] = []
-        for length_m, clay in segments:
+        for length_m, ground in segments:
             end_m += length_m
-            self.segments.append(Segment(end_m, clay))
+            self.segments.append(Segment(end_m, ground))
         self.stones = tuple(stones)
         self.ridges = ridges
         self._chain = StrengthChain(random_strength) if random_strength.relative_spread else None
@@ -86,9 +87,9 @@ class Track:
                 return segment
         return self.segments[-1]
 
-    def clay_at(self, x_m: float) -> Clay:
-        clay = self.segment_at(x_m).clay
-        return clay.scaled(self._chain.factor_at(x_m)) if self._chain else clay
+    def ground_at(self, x_m: float) -> Ground:
+        ground = self.segment_at(x_m).ground
+        return ground.scaled(self._chain.factor_at(x_m)) if self._chain else ground
 
     def surface_m(self, x_m: float) -> float:
         """Return how far the mud's surface lies below its nominal height because of the ridges."""

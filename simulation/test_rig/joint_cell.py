@@ -11,9 +11,8 @@ from math import degrees, hypot
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import stroke_moment_m4, submerged_plate
-from simulation.mud.clay import Clay
-from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, plate_size, twist_of
-from simulation.mud.plate_contact import PlateContact
+from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, contact_of, plate_size, twist_of
+from simulation.mud.ground_contact import Ground
 from simulation.test_rig.load_cell import Curve, LoadCell
 
 STEP_M = 0.0001
@@ -24,13 +23,13 @@ class JointCell:
     """Owns the plate on its arm: its angle and its contact."""
 
     def __init__(
-        self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, surface_m: float, relaxation: float
+        self, ground: Ground, geometry: FlipperGeometry, sweep_rad: float, surface_m: float, relaxation: float
     ) -> None:
-        self._clay = clay
+        self._ground = ground
         self._geometry = geometry
         self._sweep_rad = sweep_rad
         self._surface_m = surface_m
-        self._plate = PlateContact(plate_size(geometry), relaxation)
+        self._plate = contact_of(ground, plate_size(geometry), relaxation)
         self.clear_m = -max(abs(outward_m) for outward_m, _ in geometry.plate.corners)  # all corners out, at any lean
         self._adduction_rad = self._angle_at_rad(self.clear_m)
         self._depth_m = self.clear_m
@@ -66,7 +65,7 @@ class JointCell:
         geometry, sweep_rad = self._geometry, self._sweep_rad
         attitude = attitude_of(geometry, sweep_rad, self._adduction_rad, self._surface_m)
         twist = twist_of(geometry, ArmMotion(sweep_rad, self._adduction_rad, adduction_rad_s=turn_rad / dt_s))
-        wrench = self._plate.step(dt_s, self._clay, attitude, twist)
+        wrench = self._plate.step(dt_s, self._ground, attitude, twist)
         within = wrench._replace(normal_n=0.0, normal_outward_nm=0.0, normal_upward_nm=0.0)
         return contact_force(geometry, sweep_rad, within).adduction_nm
 

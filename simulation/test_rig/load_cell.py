@@ -16,10 +16,9 @@ from math import ceil, cos, fsum
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
 from simulation.mud.carriage import plate_directions
-from simulation.mud.clay import Clay, rate_factor
-from simulation.mud.flipper_contact import plate_size
+from simulation.mud.flipper_contact import contact_of, plate_size
+from simulation.mud.ground_contact import Ground
 from simulation.mud.mud_springs import SIDEWAYS_YIELD_M
-from simulation.mud.plate_contact import PlateContact
 from simulation.mud.rigid_plate import Attitude, Twist, lowest_point_m
 
 STEP_S = 0.0005
@@ -33,12 +32,12 @@ class LoadCell:
     """Owns the plate on its carrier: its depth and its contact."""
 
     def __init__(
-        self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
+        self, ground: Ground, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
     ) -> None:
         self.axes = plate_directions(sweep_rad, adduction_rad)
-        self.clay, self._geometry = clay, geometry
-        self.plate = PlateContact(plate_size(geometry), relaxation)
-        self._upright = Attitude(0.0, -self.axes[1][2], self.axes[2][2])
+        self.ground, self._geometry = ground, geometry
+        self.plate = contact_of(ground, plate_size(geometry), relaxation)
+        self._upright = Attitude(0.0, -self.axes[1][2], self.axes[2][2], -self.axes[0][2])
         self.clear_m = -lowest_point_m(self._upright, self.plate.size)  # depth at which the plate is just out
         self.reset()
 
@@ -50,7 +49,7 @@ class LoadCell:
         """Return the force (forward, upward) at the end of a step of this motion."""
         self.depth_m -= dt_s * upward_m_s
         twist = Twist(*(axis[0] * forward_m_s + axis[2] * upward_m_s for axis in self.axes))
-        wrench = self.plate.step(dt_s, self.clay, self._upright._replace(depth_m=self.depth_m), twist)
+        wrench = self.plate.step(dt_s, self.ground, self._upright._replace(depth_m=self.depth_m), twist)
         forces_n = wrench[:3]  # along the three axes
         forward_n = fsum(force_n * axis[0] for force_n, axis in zip(forces_n, self.axes, strict=True))
         return forward_n, fsum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
@@ -72,7 +71,7 @@ class LoadCell:
 
 
 def measure_shear(
-    clay: Clay,
+    ground: Ground,
     geometry: FlipperGeometry,
     sweep_rad: float,
     adduction_rad: float,
@@ -84,10 +83,10 @@ def measure_shear(
 
     Raises ValueError where the first half is too short for all the mud to yield.
     """
-    needed_m = 2.0 * SIDEWAYS_YIELD_M * rate_factor(speed_m_s) / cos(sweep_rad)
+    needed_m = 2.0 * SIDEWAYS_YIELD_M * ground.rate_factor(speed_m_s) / cos(sweep_rad)
     if distance_m < needed_m:
         raise ValueError(f"distance_m = {distance_m:g}: must be at least {needed_m:.3f} for the mud to yield")
-    cell = LoadCell(clay, geometry, sweep_rad, adduction_rad)
+    cell = LoadCell(ground, geometry, sweep_rad, adduction_rad)
     cell.depth_m = depth_m
     steps = ceil(distance_m / (speed_m_s * STEP_S))
     forces_n = [cell.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(steps)]

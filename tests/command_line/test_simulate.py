@@ -60,7 +60,7 @@ def test_a_world_is_simulated_as_it_is_written(short_folder: Path, world: Path, 
     assert main(["simulate", "--config", str(setup), "--world", str(world)]) == exit_codes.OK
     (simulated,) = peers
     plant, drives = simulated.robot.plant, simulated.robot.drives
-    assert [segment.clay.name for segment in plant.track.segments] == ["2000 Pa"]
+    assert [segment.ground.name for segment in plant.track.segments] == ["2000 Pa"]
     assert (plant.parameters.body_mass_kg, plant.parameters.disturbances.clinging_n) == (3.0, 0.5)
     assert {drive.parameters.encoder_counts for drive in drives} == {4096}
     assert {drive.parameters.watchdog_s for drive in drives} == {0.5}
@@ -74,7 +74,7 @@ def test_without_a_world_there_are_the_paper_s_muds(
 ) -> None:
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), *arguments]) == exit_codes.OK
-    assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
+    assert [segment.ground.name for segment in peers[0].robot.plant.track.segments] == names
     assert {drive.parameters.watchdog_s for drive in peers[0].robot.drives} == {peer.WATCHDOG_S}
 
 

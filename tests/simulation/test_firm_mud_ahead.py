@@ -43,7 +43,7 @@ def walk_into(robot: Lockstep, pascal: float) -> tuple[set[Phase], EventRecorder
     """Walk a copy until it is well inside firm mud of this strength, held there, or out of time."""
     robot, seen = copy_of(robot), {Phase.REST}
     segments = robot.robot.plant.track.segments
-    segments[1] = segments[1]._replace(clay=Clay("firm", pascal))
+    segments[1] = segments[1]._replace(ground=Clay("firm", pascal))
     end_s = robot.now_s + 20.0
     while robot.robot.plant.body_m < SOFT_M + 0.2 and robot.now_s < end_s and Phase.RECOVERY not in seen:
         robot.step()

@@ -113,7 +113,7 @@ class SoakedRobot(Lockstep):
     def _track(self) -> Track:
         waters = [self.chance.uniform(DRIEST_PERCENT + 1.0, WETTEST_PERCENT - 1.0) for _ in range(SEGMENTS)]
         track = Track([(SEGMENT_M, clay_of_water(water)) for water in waters], random_strength=RandomStrength(0.2))
-        track.clay_at(SEGMENTS * SEGMENT_M)  # drawn as far as this, so that it does not grow on the way
+        track.ground_at(SEGMENTS * SEGMENT_M)  # drawn as far as this, so that it does not grow on the way
         return track
 
     def run_for(self, duration_s: float) -> None:

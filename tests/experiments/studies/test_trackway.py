@@ -46,7 +46,7 @@ def reported(walk: Walk = WHOLE) -> Result:
 
 def test_the_simulated_trackway_is_the_papers() -> None:
     segments = paper_track().segments
-    assert [segment.clay for segment in segments] == list(MUDS.values())
+    assert [segment.ground for segment in segments] == list(MUDS.values())
     assert [segment.end_m for segment in segments] == pytest.approx([0.61, 1.22, 1.83])
     assert gaits_of(("paper",)) == {
         "3 cm": {"depth_m": 0.03},

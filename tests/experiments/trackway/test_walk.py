@@ -120,7 +120,7 @@ class LoggedWalks(NamedTuple):
 
 
 def mud_at(position_m: float) -> str:
-    return TRACK.clay_at(position_m).name
+    return TRACK.ground_at(position_m).name
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,9 @@ def found(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Row]]:
         replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, depth_m)) for i, k_p in enumerate(estimates)]
         monkeypatch.setattr(experiments.trials.transitions, "replay_trial", lambda trial, parameters: replayed)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
-        return transitions_of(trial, {(truth.flipper, truth.index): {"k_p": K_P[truth.clay.name]} for truth in truths})
+        return transitions_of(
+            trial, {(truth.flipper, truth.index): {"k_p": K_P[truth.ground.name]} for truth in truths}
+        )
 
     return transitions
 

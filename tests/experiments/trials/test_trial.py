@@ -70,7 +70,7 @@ def test_messages_are_at_most_two_milliseconds_old() -> None:
 
 
 def test_there_is_a_truth_of_each_flippers_every_stride() -> None:
-    truths = [(truth.flipper, truth.index, truth.clay.name) for truth in trial().truths]
+    truths = [(truth.flipper, truth.index, truth.ground.name) for truth in trial().truths]
     assert truths == [(flipper, 0, "47.6") for flipper in FLIPPERS]
     assert all(truth.insertion.deepest_m > 0.02 for truth in trial().truths)
 

@@ -10,9 +10,10 @@ from control.records import Joints
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.carriage import Carriage
-from simulation.mud.clay import MUDS, Clay, rate_factor
+from simulation.mud.clay import ADHESION, MUDS, Clay, rate_factor
 from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, FlipperContact
+from simulation.mud.ground_contact import Ground
 from simulation.mud.rigid_plate import Attitude
 from simulation.mud.track import Track
 from tests.control.synthetic_states import NO_TORQUE
@@ -30,7 +31,13 @@ class ConstantThrust(FlipperContact):
     thrust_n = 0.0
 
     def step(
-        self, dt_s: float, clay: Clay, motion: ArmMotion, attitude: Attitude, carriage: Carriage | None = None
+        self,
+        dt_s: float,
+        ground: Ground,
+        motion: ArmMotion,
+        attitude: Attitude,
+        carriage: Carriage | None = None,
+        edge_m: float = 0.0,
     ) -> ContactForce:
         return NO_CONTACT._replace(thrust_n=self.thrust_n)
 
@@ -184,7 +191,7 @@ def test_an_arm_reports_the_remoulded_clay_under_its_flipper() -> None:
     plant, strengths_pa = Plant(parameters, Track([(9.0, Clay("any", 1000.0))])), []
     for _ in range(3):
         run(plant, 0.3, Joints(0.0, -0.3, 0.0, -0.3))
-        strengths_pa.append(plant.arms[0].clay.strength_pa)
+        strengths_pa.append(plant.arms[0].ground.sticking_pa(0.0) / ADHESION)
         run(plant, 0.3, Joints(0.0, 0.6, 0.0, 0.6))
     assert strengths_pa == pytest.approx([500.0 + 500.0 * exp(-0.4 * earlier) for earlier in range(3)])
 
@@ -193,4 +200,4 @@ def test_the_clay_is_the_one_where_the_flipper_is_not_where_the_body_is() -> Non
     plant = Plant(PlantParameters(), Track([(0.05, MUDS["48.5"]), (1.0, MUDS["53.1"])]))
     plant.arms[0].sweep_rad, plant.arms[1].sweep_rad = radians(30.0), radians(-30.0)
     plant.step(STEP_S, NO_TORQUE)
-    assert [arm.clay for arm in plant.arms] == [MUDS["53.1"], MUDS["48.5"]]
+    assert [arm.ground for arm in plant.arms] == [MUDS["53.1"], MUDS["48.5"]]

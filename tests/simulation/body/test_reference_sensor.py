@@ -134,12 +134,12 @@ def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
 def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
     reference, plant = StrokeReference(), make_plant()
     arm = plant.arms[0]
-    arm.clay, arm.history.surface_m = Clay("remoulded", 1234.0), 0.002
+    arm.ground, arm.history.surface_m = Clay("remoulded", 1234.0), 0.002
     watch(reference, plant, INSERTION)
-    arm.clay, arm.history.surface_m = Clay("next", 2000.0), -0.001
+    arm.ground, arm.history.surface_m = Clay("next", 2000.0), -0.001
     left, right = watch(reference, plant, STANCE, EXTRACTION, SWING)
-    assert (left.clay, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
-    assert (right.clay, right.surface_m) == (MUDS["48.5"], 0.0)
+    assert (left.ground, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
+    assert (right.ground, right.surface_m) == (MUDS["48.5"], 0.0)
     assert left.insertion.deepest_m == pytest.approx(0.028)
 
 
@@ -196,6 +196,6 @@ def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configura
     (first, _), thrusts_n = observe_walk(lockstep, 1)
     stance = first.stance
     shear_n = measure_shear(
-        first.clay, configuration.geometry, stance.sweep_rad, stance.adduction_rad, stance.deepest_m, stance.speed_m_s
+        first.ground, configuration.geometry, stance.sweep_rad, stance.adduction_rad, stance.deepest_m, stance.speed_m_s
     )
     assert np.mean(thrusts_n) == pytest.approx(shear_n, rel=0.1)

@@ -21,6 +21,9 @@ from simulation.harness.world import (
 )
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB
+from simulation.mud.ground_contact import Ground
+from simulation.mud.grounds.sand import Sand
+from simulation.mud.grounds.thixotropic_mud import ThixotropicMud
 from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
 from simulation.mud.unevenness import Ridges
@@ -51,11 +54,11 @@ def problems_of(text: str) -> list[str]:
 def test_the_example_has_the_values_that_it_documents() -> None:
     world = load_world(EXAMPLE)
     crusted = Clay("1500 Pa", 1500.0, (Layer(0.0, 0.004, 1.5), Layer(0.025, 0.035, 0.5)))
-    assert [segment.clay for segment in world.track.segments] == [clay_of_water(48.5), crusted, clay_of_water(46.0)]
+    assert [segment.ground for segment in world.track.segments] == [clay_of_water(48.5), crusted, clay_of_water(46.0)]
     assert [segment.end_m for segment in world.track.segments] == pytest.approx([0.6, 1.2, 1.8])
     assert world.track.stones == (Stone(0.40, 0.46, 0.015),)
     assert world.track.ridges == Ridges(0.002, 0.25)
-    assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
+    assert world.track.ground_at(0.3) != clay_of_water(48.5)
     assert world.disturbances == replace(LAB, current_noise_a=0.0, current_limit_a=0.0)  # the drives have them
     assert world.robot_changes == {
         "body_mass_kg": 1.0,
@@ -79,6 +82,13 @@ def test_the_example_shows_every_section() -> None:
     sections = {item.name for item in fields(WorldText)} - {"segment", "stone"}
     for name in ("[[segment]]", "[[segment.layer]]", "[[stone]]", *(f"[{section}]" for section in sections)):
         assert name in shown
+
+
+def test_a_segment_may_be_sand_or_thixotropic() -> None:
+    sand = SECOND.replace("water_percent = 48.5", "sand = 'spatial'\nstiffness_n_m3 = 1e6\n")
+    segments = parse_world(SHORTEST + "[segment.thixotropy]\n" + sand).track.segments
+    expected: list[Ground] = [ThixotropicMud(Clay("2000 Pa", 2000.0)), Sand("spatial sand", 1e6, spatial=True)]
+    assert [segment.ground for segment in segments] == expected
 
 
 @pytest.mark.parametrize(
@@ -109,6 +119,9 @@ def test_the_example_shows_every_section() -> None:
         (SECOND.replace("48.5", "'wet'"), "segment 2.water_percent", "'wet'"),
         (SECOND + "strength_pa = 900", "segment 2.water_percent", "strength_pa = 900"),
         (SECOND.replace("water_percent = 48.5", ""), "segment 2", "strength_pa"),
+        (SECOND.replace("water_percent = 48.5", "sand = 'gravel'"), "segment 2.sand", "spatial"),
+        (SECOND + "sand = 'spatial'", "segment 2.water_percent", "sand = 'spatial'"),
+        (SECOND + "[segment.thixotropy]\nrecovery_s = -1\n", "segment 2.thixotropy.recovery_s", "0.1"),
         (SECOND.replace("0.5", "0.4"), "segment 2.start_m", "overlap"),
         (SECOND.replace("0.5", "0.6"), "segment 2.start_m", "gap"),
         (SECOND.replace("1.0", "0.5"), "segment 2.end_m", "start_m = 0.5"),

@@ -5,7 +5,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from simulation.mud.clay import MUDS, Clay
+from simulation.mud.clay import ADHESION, MUDS, Clay
 from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
 from simulation.mud.track import COMPARTMENT_M, Track, paper_track
@@ -17,7 +17,7 @@ FIRM, SOFT = Clay("firm", 3000.0, (Layer(0.0, 0.01, 2.0),)), Clay("soft", 1000.0
 @pytest.mark.parametrize(("x_m", "name"), [(-0.1, "48.5"), (0.6, "48.5"), (0.61, "53.1"), (1.3, "45.3"), (9.0, "45.3")])
 def test_the_paper_s_track_has_three_even_muds_and_the_last_has_no_end(x_m: float, name: str) -> None:
     track = paper_track()
-    assert (track.clay_at(x_m), track.surface_m(x_m), track.stones) == (MUDS[name], 0.0, ())
+    assert (track.ground_at(x_m), track.surface_m(x_m), track.stones) == (MUDS[name], 0.0, ())
     assert track.length_m == pytest.approx(3 * COMPARTMENT_M)
 
 
@@ -31,7 +31,7 @@ def test_ridges_rise_from_the_start_and_repeat_after_their_wavelength_between_st
 
 def strengths_pa(parameters: RandomStrength, positions_m: np.ndarray) -> np.ndarray:
     track = Track([(400.0, SOFT)], random_strength=parameters)
-    return np.array([track.clay_at(float(x_m)).strength_pa for x_m in positions_m])
+    return np.array([track.ground_at(float(x_m)).sticking_pa(0.0) / ADHESION for x_m in positions_m])
 
 
 def test_random_strength_has_the_requested_mean_and_spread_and_no_outliers() -> None:
@@ -63,6 +63,7 @@ def test_random_strength_is_about_each_segment_s_own_with_its_name_and_layers() 
         for a, b in ((FIRM, SOFT), (SOFT, FIRM))
     )
     for x_m, clay, other in ((0.4, FIRM, SOFT), (1.6, SOFT, FIRM)):
-        here, there = wandering.clay_at(x_m), swapped.clay_at(x_m)
+        here, there = wandering.ground_at(x_m), swapped.ground_at(x_m)
+        assert isinstance(here, Clay) and isinstance(there, Clay)
         assert (here.name, here.layers) == (clay.name, clay.layers)
         assert here.strength_pa / clay.strength_pa == pytest.approx(there.strength_pa / other.strength_pa)
