@@ -36,10 +36,15 @@ LOGS: Mapping[str, Command] = {
     "pull": ("logs.log_pull.pull", "Copy new logs from a robot over SSH, and mark them as copied."),
     "recover": ("logs.log_folder_commands.recover", "Repair logs whose writer was interrupted."),
 }
+GAIT: Mapping[str, Command] = {
+    "check": ("gait.check", "Check a gait file, and draw its path over the ground."),
+    "simulate": ("gait.simulate", "Walk a gait file in simulated mud."),
+}
 COMMANDS: Mapping[str, Command] = {
     "status": ("operation.operation.status", "Print the state of the robot."),
     "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
+    "gait": (GAIT, "Check and simulate gaits of your own."),
     "run": ("operation.run.run", "Walk by a control law of your own: a function in a file, called once a stride."),
     "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
     "probe": ("operation.probe.probe", "Find the height of the mud, with its error, by light touches."),

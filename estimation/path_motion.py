@@ -30,7 +30,7 @@ class PathMotion:
         elif self._part is Phase.INSERTION:
             self._farthest_m = max(depth_m, self._farthest_m)
             if depth_m < self._farthest_m - TURNED_M:
-                self._begin(Phase.EXTRACTION, depth_m)
+                self._begin(Phase.EXTRACTION if is_in_mud else Phase.SWING, depth_m)  # a quick rise bounces in the air
         else:
             self._farthest_m = min(depth_m, self._farthest_m)
             if depth_m > self._farthest_m + TURNED_M:

@@ -90,6 +90,7 @@ def walk(
     adaptive: Annotated[
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
     ] = False,
+    gait: Annotated[str, Option("walk the gait of this file, or of one that ships", metavar="FILE")] = "",
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
     mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
     water: Annotated[
@@ -106,12 +107,18 @@ def walk(
 
     Depths in turn, such as `--depth 2 --depth 3.5 --depth 5`, measure how the coefficients change with depth.
 
+    A gait of a file has its own depths, unless `depth` is given. 'mudskipper gait check FILE' needs no robot.
+
     A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
     """
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
     described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
     described["water"] = "" if water is None else f"{water:g}"
     params |= {key: value for key, value in described.items() if value}
+    if gait:
+        from firmware_host.configuration.gait_file import as_json, gait_document  # `status` does without it
+
+        params["gait"] = as_json(gait_document(gait))
     if depth:
         depths_m = [each / 100.0 for each in depth]
         params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}

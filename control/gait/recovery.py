@@ -9,9 +9,9 @@ rest of it back.
 A steady pull at full torque comes to rest where mud, joints and body balance. A torque that reverses suddenly throws
 the plate against the mud's spring by half beyond that balance, and away from the middle of the sweep the load on the
 plate's face has a lifting component too (by the sine of the sweep angle). Each such peak lifts the plate a little; to
-sink by as much, the mud would have to yield in the other direction. The first attempt rocks to the rear, as the stance
-did, and takes the body along. The later ones rock away from the middle on the flipper's side, where the lever l cos α
-of the mud that sticks to the plate is shorter too.
+sink by as much, the mud would have to yield in the other direction. The first attempt rocks on in the direction of the
+stance, to the rear in a walk forward, and takes the body along. The later ones rock away from the middle on the
+flipper's side, where the lever l cos α of the mud that sticks to the plate is shorter too.
 
 In simulated clay of up to 9 kPa, at commanded depths of 3 to 5 cm, every flipper came out within 12 s; the body moved
 8 to 11 cm forward meanwhile, and never more than 4 mm back. A steady pull freed no flipper from 6 kPa and 5 cm on;
@@ -137,7 +137,7 @@ class Recovery:
         if not stuck:
             return self._faded(wanted)
         if self._time_s > self._allowed_s:
-            self._begin_attempt(stuck, states)
+            self._begin_attempt(stuck, states, wanted)
         if not self.attempt:
             return wanted
         targets = self._pull(dt_s, stuck, states)
@@ -150,7 +150,7 @@ class Recovery:
     def _allowed_s(self) -> float:
         return self.parameters.pause_s + self.parameters.attempt_s if self.attempt else self.parameters.grace_s
 
-    def _begin_attempt(self, stuck: Sequence[str], states: DriveStates) -> None:
+    def _begin_attempt(self, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> None:
         """Begin the next attempt from the present pose; after the last one, give up."""
         if self.attempt == self.parameters.attempts:
             self.given_up = stuck
@@ -159,8 +159,9 @@ class Recovery:
         self._time_s = 0.0
         angles_rad = states.map(lambda state: state.angle_rad)
         self._targets = still(angles_rad)
-        sweeps_rad = [angles_rad[self.rig.joints_of(name)][0] for name in stuck]
-        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, fsum(sweeps_rad))
+        stroke_rad = wanted.map(lambda target: target.angle_rad)  # ends where the first attempt goes on
+        away_rad = stroke_rad if self.attempt == 1 else angles_rad
+        self._direction = copysign(1.0, fsum(away_rad[self.rig.joints_of(name)][0] for name in stuck))
         self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
     def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:

@@ -3,6 +3,7 @@
 On the way to the daemon a gait is the same tables as JSON, on one line and without comments.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,10 @@ def read_gait(document: dict[str, Any]) -> GaitPath:
     except ConfigurationError as problem:
         name = document.get("name") or "gait"
         raise ConfigurationError([f"{name}: {each}" for each in problem.problems]) from None
+
+
+def as_json(document: dict[str, Any]) -> str:
+    return json.dumps(document, separators=(",", ":"), default=str)
 
 
 def _protocol(name: str) -> GaitParameters:

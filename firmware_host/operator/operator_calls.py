@@ -5,8 +5,9 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
+import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import degrees, inf
 from typing import Any
@@ -14,10 +15,15 @@ from typing import Any
 from control.controller import WalkOrder
 from control.fault_causes import group_by_cause
 from control.faults import Blocks, Fault
-from control.gait.stride_table import full_step_m
+from control.gait.stride_table import crutching_parameters, full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
 from control.records import JOINTS, UNKNOWN
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.gait_checks import gait_problems
+from firmware_host.configuration.gait_file import read_gait
 from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -179,17 +185,44 @@ class OperatorCalls:
         if in_turn_m and depth_m is not None:
             raise RefusedError("give either depth_m or depths_m")
         depths_m = in_turn_m or (() if depth_m is None else (depth_m,))
+        path = self._gait(params["gait"]) if params["gait"] and self._loop.mode is Mode.HOLD else None  # else refused
+        depths_m = depths_m or (path.depths_m if path else ())
         for each_m in depths_m:
             self._require_depth(each_m)
+        gait = self._checked(path, depths_m) if path else None
         order = WalkOrder(
             depth_m=float(depths_m[0]) if depths_m else self._loop.configuration.adaptation.initial_depth_m,
             adaptive=not depths_m,
             strides=params["strides"],
-            depths_m=tuple(map(float, in_turn_m)),
+            depths_m=tuple(map(float, depths_m)) if len(depths_m) > 1 else (),
+            gait=gait,
         )
         answer = self._request(caller, Request.WALK, order)
+        if path:
+            self._loop.events.report(self._clock(), f"gait by {caller}: {params['gait']}")
         self._trials.begin(trial, caller)
         return answer
+
+    def _gait(self, text: str) -> GaitPath:
+        """Return the gait of a file's tables as JSON. Raises RefusedError."""
+        try:
+            document = json.loads(text)
+            return read_gait(document if isinstance(document, dict) else {})
+        except (ValueError, RecursionError):
+            raise RefusedError("gait: must be the tables of a gait file as JSON") from None
+        except ConfigurationError as problem:
+            raise RefusedError(problem.problems[0]) from None
+
+    def _checked(self, path: GaitPath, depths_m: Sequence[float]) -> GaitParameters | GaitPath:
+        """Return the gait that the loop walks, the parameters of a crutching one. Raises RefusedError."""
+        parameters = crutching_parameters(path)
+        if not depths_m and parameters is None:
+            raise RefusedError(f"{path.name}: depths_m is missing: only the crutching gait's depth adapts to the mud")
+        configuration, mud = self._loop.configuration, self._loop.learning.estimator.mud_estimate
+        deepest_m = max(depths_m, default=configuration.adaptation.initial_depth_m)
+        if problem := next(gait_problems(path, configuration, deepest_m, mud), ""):
+            raise RefusedError(problem)
+        return parameters or path
 
     def _require_depth(self, depth_m: float) -> None:
         """Raise RefusedError for a depth beyond the configured ones."""
@@ -208,6 +241,10 @@ class OperatorCalls:
                 f"cannot change the depth in mode {self._loop.mode.name.lower()}: the robot does not walk"
             )
         given = {key: params[key] for key in GAIT_UNITS if params.get(key) is not None}
+        if path := self._loop.controller.gait.path:
+            if given:
+                raise RefusedError(f"{min(given)}: must be left out while the robot walks {path.name}")
+            self._checked(path, [params["depth_m"]])
         gait = replace(self._loop.controller.gait.next_parameters, **given)
         configuration, sweep_deg = self._loop.configuration, gait.sweep_angle_deg
         widest_deg = configuration.limits.widest_sweep_deg
@@ -357,7 +394,7 @@ def _walk_report(loop: Loop) -> dict[str, Any]:
         "depth_m": loop.stride_depth_m,
         "next_depth_m": gait.next_depth_m,
         "depth_reason": loop.learning.depth_reason,
-        "full_step_m": full_step_m(gait.next_parameters, loop.configuration.geometry),  # if nothing slips
+        "full_step_m": 0.0 if gait.path else full_step_m(gait.next_parameters, loop.configuration.geometry),
         "body_x_m": known(loop.body.x_m),
     }
 

@@ -167,6 +167,12 @@ DEPTH = Parameter(
 DEPTHS = DEPTH._replace(
     name="depths_m", type=Type.NUMBERS, meaning="fixed depths of the strides in turn, in place of depth_m"
 )
+GAIT_FILE = Parameter(
+    "gait",
+    Type.TEXT,
+    "the tables of a gait file as JSON, in place of the configured gait; its depths_m count where no depth is given",
+    longest=3000,
+)
 FIXED_DEPTH = DEPTH._replace(meaning="depth of every stride", null_is_default=False, required=True)
 GAIT_UNITS = {
     "sweep_angle_deg": "degrees",
@@ -225,7 +231,7 @@ STATUS_KEYS = {
     "depth_m": "commanded depth of this stride in m",
     "next_depth_m": "depth of the next stride in m",
     "depth_reason": "why that depth was chosen",
-    "full_step_m": "step in m of a stride in which nothing slips",
+    "full_step_m": "step in m of a stride of the crutching gait in which nothing slips, else 0",
     "body_x_m": "position of the body along the track in m",
     "pose": "source of the body's position and its state",
     "drives": "every drive, in the order of the joints: signals, their ages in s, error text, firmware and watchdog",
@@ -304,7 +310,7 @@ METHODS: dict[str, SocketMethod] = {
     "walk": SocketMethod(
         Level.DRIVE,
         "Walk, with a depth that adapts to the mud or is fixed. A described walk is a trial: it begins a new log.",
-        (DEPTH, DEPTHS, STRIDES, *LEASE, *TRIAL),
+        (DEPTH, DEPTHS, STRIDES, GAIT_FILE, *LEASE, *TRIAL),
     ),
     "depth": SocketMethod(
         Level.DRIVE,

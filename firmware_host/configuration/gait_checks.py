@@ -1,0 +1,161 @@
+"""Checks a gait whole before any joint follows it: its keys, then the strides that they make with this robot.
+
+Each problem is one message with file, phase, key, value and bound. The currents are those that the forecast of depths
+expects (control/depth/forecast.py): k_p Φ on the way down, half of k_e Φ, the peak of an extraction, on the way up; and
+backward or forward k_s Ψ, or what moves the body against its drag if that is less. Where no mud is known, the paper's
+of 49.5 % water is expected. The acceleration of body and arms is not in it: it lasts tens of milliseconds.
+"""
+
+from collections.abc import Iterator
+from math import cos, degrees, hypot, sin
+from typing import NamedTuple
+
+from control.gait.gait import smooth_progress
+from control.gait.recovery import is_in_mud
+from control.gait.stride_table import PhaseRow, stride_table
+from control.geometry import FlipperGeometry
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
+from control.parameters.gait_path import GaitPath, GaitPhase
+from control.plate_integrals import stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.records import Phase
+from firmware_host.configuration.configuration import Configuration
+
+POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
+PEAK_FRACTION = 0.5  # of k_e Φ
+EXPECTED_N_M3 = {"k_p": 0.82e6, "k_s": 0.46e6, "k_e": 1.45e6}  # 49.5 % water, docs/results/loadcell.json
+
+
+class Pose(NamedTuple):
+    """A point of a path, and the speeds there."""
+
+    sweep_rad: float
+    depth_m: float
+    swept_rad_s: float
+    sunk_m_s: float
+
+
+def gait_problems(
+    path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate = NOTHING_KNOWN
+) -> Iterator[str]:
+    """Yield what is wrong with a gait: first with its keys, else with its deepest stride in this mud."""
+    problems = list(_key_problems(path)) or list(_stride_problems(path, configuration, depth_m, mud))
+    yield from (f"{path.name or 'gait'}: {problem}" for problem in problems)
+
+
+def _key_problems(path: GaitPath) -> Iterator[str]:
+    names = [phase.name for phase in path.phase]
+    if "swing" not in names or names.index("swing") != len(names) - 1 or len(names) < 2:
+        yield f"phase = {', '.join(names) or 'none'}: the last of two or more must be a swing, and no other one"
+    for number, phase in enumerate(path.phase):
+        key = _phase_key(path, number)
+        yield from (f"{key}.{problem}" for problem in _phase_problems(phase, path.right_offset_fraction > 0.0))
+
+
+def _phase_problems(phase: GaitPhase, apart: bool) -> Iterator[str]:
+    for number, point in enumerate(phase.way_points, 1):
+        if (point.depth_m is None) is (point.depth_fraction is None):
+            yield f"way_points {number}: must have one of depth_m and depth_fraction"
+    if (phase.speed_m_s is None) is (phase.duration_s is None):
+        yield "duration_s: the phase must end, by either duration_s or speed_m_s"
+    if (phase.name == "pause") is not (len(phase.way_points) == 0):
+        yield f"way_points: {'must be left out of a pause' if phase.way_points else 'is missing'}"
+    if phase.name == "pause" and phase.duration_s is None:
+        yield "duration_s is missing: a pause has no path that a speed could end"
+    if phase.curve == "half_ellipse" and len(phase.way_points) != 2:
+        yield f"way_points: must be 2 for a half ellipse, its peak and its end, not {len(phase.way_points)}"
+    for key in ("until_force_n", "until_depth_m"):
+        if getattr(phase, key) is not None and (apart or phase.name == "swing"):
+            where = "where right_offset_fraction keeps the flippers apart" if apart else "of a swing"
+            yield f"{key} = {getattr(phase, key):g}: must be left out {where}"
+
+
+def _phase_key(path: GaitPath, number: int) -> str:
+    return f"phase {number + 1} ({path.phase[number].name})"
+
+
+def _stride_problems(path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate) -> Iterator[str]:
+    """Yield the first problem of each row."""
+    for row in stride_table(path, configuration.geometry, depth_m):
+        found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration, mud))
+        if problem := next(found, ""):
+            yield f"{_phase_key(path, row.number)}.{problem}"
+
+
+def _poses(row: PhaseRow) -> Iterator[Pose]:
+    for i in range(POINTS + 1):
+        fraction, rate = smooth_progress(row.duration_s * i / POINTS, row.duration_s)
+        sweep_rad, depth_m, sweep_rate, depth_rate = row.at(fraction)
+        yield Pose(sweep_rad, depth_m, sweep_rate * rate, depth_rate * rate)
+
+
+def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud: MudEstimate) -> Iterator[str]:
+    geometry, limits = configuration.geometry, configuration.limits
+    sweep_rad, depth_m, swept_rad_s, sunk_m_s = pose
+    sweep_deg = degrees(sweep_rad)
+    where = f"way_points: depth {100.0 * depth_m:.2f} cm at a sweep of {sweep_deg:.1f} degrees"
+    if not limits.sweep_min_deg <= sweep_deg <= limits.sweep_max_deg:
+        low_deg, high_deg = limits.sweep_min_deg, limits.sweep_max_deg
+        yield f"{where}: must be from {low_deg:g} to {high_deg:g} degrees, limits.sweep_min_deg and sweep_max_deg"
+    if not geometry.is_reachable(sweep_rad, depth_m):
+        yield f"{where}: out of reach, must be at most {100.0 * geometry.deepest_m(sweep_deg):.2f} cm"
+        return
+    lift_rad = geometry.adduction_rad(sweep_rad, depth_m)
+    lift_deg, low_deg, high_deg = degrees(lift_rad), limits.adduction_min_deg, limits.adduction_max_deg
+    if not low_deg <= lift_deg <= high_deg:
+        bounds = f"from {low_deg:g} to {high_deg:g}, limits.adduction_min_deg and adduction_max_deg"
+        yield f"{where}: adduction at {lift_deg:.1f} degrees must be {bounds}"
+    inside_m = -_innermost_m(geometry, sweep_rad, lift_rad)
+    if inside_m > 0.0:
+        yield f"{where}: the plate crosses the body by {100.0 * inside_m:.2f} cm, must be at most 0"
+    if row.phase is Phase.SWING and is_in_mud(geometry, sweep_rad, lift_rad):
+        yield f"{where}: a swing must stay out of the mud, at most 0 cm deep"
+    lift_rad_s = geometry.adduction_velocity_rad_s(sweep_rad, lift_rad, swept_rad_s, sunk_m_s)
+    speed_rad_s = max(abs(swept_rad_s), abs(lift_rad_s))
+    if speed_rad_s > limits.velocity_rad_s:
+        fastest = f"limits.velocity_rad_s = {limits.velocity_rad_s:g}"
+        yield f"{where}: a joint turns at {speed_rad_s:.1f} rad/s, must be at most {fastest}"
+    yield from (f"{where}: {problem}" for problem in _current_problems(pose, lift_rad, configuration, mud))
+
+
+def _innermost_m(geometry: FlipperGeometry, sweep_rad: float, lift_rad: float) -> float:
+    """Return how far outward of the adduction axis the innermost corner of the plate is."""
+    return min(
+        (geometry.flipper_length_m + outward_m) * cos(sweep_rad) * cos(lift_rad)
+        + (geometry.drop_m - upward_m) * sin(lift_rad)
+        for outward_m, upward_m in geometry.plate.corners
+    )
+
+
+def _current_problems(pose: Pose, lift_rad: float, configuration: Configuration, mud: MudEstimate) -> Iterator[str]:
+    """Compare the currents against mud that yields with those that the drives may have."""
+    constants_nm_a = configuration.torque_constants_nm_a[:2]
+    largest_a = min(drive.current_limit_a for drive in configuration.flipper_drives)
+    torques_nm = expected_torques_nm(pose, lift_rad, configuration, mud)
+    for axis, torque_nm, constant_nm_a in zip(("sweep", "adduction"), torques_nm, constants_nm_a, strict=True):
+        if torque_nm > largest_a * constant_nm_a:
+            yield (
+                f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor, must be at most"
+                f" {largest_a:.1f} A ({largest_a * constant_nm_a:.2f} N·m)"
+            )
+
+
+def expected_torques_nm(
+    pose: Pose, lift_rad: float, configuration: Configuration, mud: MudEstimate = NOTHING_KNOWN
+) -> tuple[float, float]:
+    """Return the torques on sweep and adduction, each by the part of its direction in the plate's motion."""
+    geometry, adaptation = configuration.geometry, configuration.adaptation
+    sweep_rad, depth_m, swept_rad_s, sunk_m_s = pose
+    plate, along_m_s = submerged_plate(geometry, sweep_rad, lift_rad), geometry.flipper_length_m * abs(swept_rad_s)
+    speed_m_s = hypot(along_m_s, sunk_m_s)
+    if plate.area_m2 <= 0.0 or speed_m_s == 0.0:
+        return 0.0, 0.0
+    k = {name: _expected_n_m3(name, getattr(mud, name), depth_m) for name in EXPECTED_N_M3}
+    drag_n = adaptation.body_drag_n + adaptation.body_damping_n_s_m * along_m_s
+    body_nm = drag_n / len(configuration.rig.flippers) * geometry.flipper_length_m
+    sweep_nm = min(k["k_s"] * stance_moment_m4(geometry, plate) * along_m_s / speed_m_s, body_nm)
+    vertical = k["k_p"] if sunk_m_s > 0.0 else PEAK_FRACTION * k["k_e"]
+    return sweep_nm, vertical * stroke_moment_m4(geometry, plate, sweep_rad) * abs(sunk_m_s) / speed_m_s
+
+
+def _expected_n_m3(name: str, known: Coefficient | None, depth_m: float) -> float:
+    return known.at(depth_m)[0] if known and depth_m > 0.0 else EXPECTED_N_M3[name]

@@ -1,0 +1,99 @@
+"""Gaits that no robot may walk: each is refused with one message that names phase, key and bound."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from control.geometry import FlipperGeometry
+from control.mud_estimate import NOTHING_KNOWN, Coefficient
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.gait_checks import gait_problems
+from firmware_host.configuration.gait_file import SHIPPED, gait_document, read_gait
+
+NAMES = sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def point(sweep_deg: float, depth_m: float) -> dict[str, Any]:
+    return {"sweep_deg": sweep_deg, "depth_m": depth_m}
+
+
+def stroke(number: int = 1, **changes: Any) -> list[dict[str, Any]]:
+    """Return the phases of a crutching stride at 3 cm, one of them changed; None removes a key."""
+    phases: list[dict[str, Any]] = [
+        {"name": "insertion", "speed_m_s": 0.1, "way_points": [point(30.0, 0.03)]},
+        {"name": "stance", "speed_m_s": 0.3, "way_points": [point(-30.0, 0.03)]},
+        {"name": "extraction", "speed_m_s": 0.3, "way_points": [point(-30.0, -0.0145)]},
+        {"name": "swing", "duration_s": 0.8, "way_points": [point(30.0, -0.0145)]},
+    ]
+    phases[number] = {key: value for key, value in (phases[number] | changes).items() if value is not None}
+    return phases
+
+
+def problems(phases: list[dict[str, Any]], configuration: Configuration, **keys: Any) -> list[str]:
+    path = read_gait({"name": "mine.toml", "phase": phases, **keys})
+    return list(gait_problems(path, configuration, 0.03))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_gaits_that_ship_are_accepted(configuration: Configuration, name: str) -> None:
+    path = read_gait(gait_document(name))
+    assert not list(gait_problems(path, configuration, max(path.depths_m, default=0.03)))
+
+
+UNACCEPTED = {
+    "reach": (stroke(way_points=[point(-30.0, 0.06)]), "phase 2 (stance).way_points"),
+    "joint range": (stroke(way_points=[point(-70.0, 0.0)]), "phase 2 (stance).way_points"),
+    "speed": (stroke(speed_m_s=None, duration_s=0.02), "phase 2 (stance).way_points"),
+    "swing in mud": (stroke(2, way_points=[point(-30.0, 0.01)]), "phase 4 (swing).way_points"),
+    "no end": (stroke(speed_m_s=None), "phase 2 (stance).duration_s"),
+    "two ends": (stroke(duration_s=1.0), "phase 2 (stance).duration_s"),
+    "no path": (stroke(way_points=[]), "phase 2 (stance).way_points"),
+    "no depth": (stroke(way_points=[{"sweep_deg": -30.0}]), "phase 2 (stance).way_points 1"),
+    "half an ellipse": (stroke(curve="half_ellipse"), "phase 2 (stance).way_points"),
+    "condition of a swing": (stroke(3, until_force_n=1.0), "phase 4 (swing).until_force_n"),
+    "no swing": (stroke()[:3], "phase = insertion, stance, extraction"),
+    "nothing": ([], "phase = none"),
+}
+
+
+@pytest.mark.parametrize("case", UNACCEPTED)
+def test_a_wrong_gait_is_refused_with_file_phase_and_key(configuration: Configuration, case: str) -> None:
+    phases, key = UNACCEPTED[case]
+    assert problems(phases, configuration)[0].startswith(f"mine.toml: {key}")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"way_points": [{"sweep": 30.0, "depth_m": 0.0}]}, "phase 2.way_points 1.sweep"),
+        ({"way_points": [{"sweep_deg": 30.0, "depth": 0.0}]}, "phase 2.way_points 1.depth"),
+        ({"speed_m_s": 5.0}, "phase 2.speed_m_s = 5.0"),
+        ({"name": "jump"}, "phase 2.name"),
+    ],
+)
+def test_a_key_without_its_unit_or_out_of_bounds_is_named(changes: dict[str, Any], key: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        read_gait({"name": "mine.toml", "phase": stroke(**changes)})
+    assert any(each.startswith(f"mine.toml: {key}") for each in refused.value.problems)
+
+
+def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuration: Configuration) -> None:
+    firm = Coefficient(8e6, 1e5, 1e5, 0.03, -0.5, 0.1, 3)
+    path = read_gait({"name": "mine.toml", "phase": stroke()})
+    (known,) = gait_problems(path, configuration, 0.03, NOTHING_KNOWN._replace(k_e=firm))
+    assert known.startswith("mine.toml: phase 3 (extraction)")
+    assert " A " in known
+
+
+def test_conditions_belong_to_flippers_that_move_together(configuration: Configuration) -> None:
+    phases = stroke(0, until_force_n=2.0)
+    assert not problems(phases, configuration)
+    assert problems(phases, configuration, right_offset_fraction=0.5)[0].startswith("mine.toml: phase 1 (insertion)")
+
+
+@pytest.mark.parametrize(("plate_width_m", "crosses"), [(0.01, False), (0.1, True)])
+def test_a_plate_may_not_cross_the_body(configuration: Configuration, plate_width_m: float, crosses: bool) -> None:
+    rig = replace(configuration, geometry=FlipperGeometry(plate_width_m=plate_width_m))
+    assert bool(problems(stroke(way_points=[point(-50.0, 0.025)], speed_m_s=0.05), rig)[:1]) is crosses
