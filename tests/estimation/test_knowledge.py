@@ -94,6 +94,27 @@ def readings(count: int, seed: int, variance: tuple[float, float] = (0.05, 0.2))
     return [Reading(k, v, z) for k, v, z in zip(log_k.tolist(), variances.tolist(), log_depths.tolist(), strict=True)]
 
 
+def matlock_exponent(strength_pa: float, growth: float, j: float) -> float:
+    """Return the exponent of k_s from 20 to 50 mm by numerical integration, for a strength that grows with depth."""
+
+    def force_n(depth_m: float) -> float:
+        z_m = (np.arange(4000) + 0.5) / 4000.0 * depth_m
+        strengths_pa = strength_pa * (z_m / 0.035) ** growth
+        return float(
+            np.sum(strengths_pa * np.minimum(3.0 + 17.5e3 * z_m / strengths_pa + j * z_m / 0.025, 9.0)) * depth_m
+        )
+
+    return log(force_n(0.05) / force_n(0.02)) / log(2.5) - 2.0
+
+
+def test_the_law_of_shear_spans_the_exponents_of_undrained_clay() -> None:
+    muds = [(pa, growth, j) for pa in (300.0, 800.0, 3600.0) for growth in (0.0, 0.5, 1.0) for j in (0.25, 0.5)]
+    exponents = [matlock_exponent(*mud) for mud in muds]
+    assert min(exponents) < -0.9 and max(exponents) > 0.1
+    assert all(abs(each - SHEAR_LAW.exponent) < 2.1 * SHEAR_LAW.std_error for each in (-1.0, *exponents))
+    assert np.std([min(exponents), max(exponents)]) / sqrt(3.0) == pytest.approx(SHEAR_LAW.std_error, abs=0.02)
+
+
 def line_through(rows: Sequence[Reading], law: DepthLaw = SHEAR_LAW) -> Line:
     line = Line(0.0, 0.0, 0.0, law.exponent, law.std_error**-2, 0)
     for row in rows:
