@@ -58,7 +58,7 @@ class Reachability:
         self._lags_s = lags_s
         self.gains = [_gain(drive.parameters) for drive in self._robot.lockstep.robot.drives]
         for index, joint in enumerate(JOINTS):
-            cut = self._failures.failing and any(self._cuts(component) for component in self._paths[index])
+            cut = bool(self._failures.failing) and any(self._cuts(component) for component in self._paths[index])
             self._disturbed_s[index] = _last_s(self._disturbed_s[index], cut, now_s)
             own = [each.mode.component for each in self._robot.active if each.mode and each.joint == joint]
             self._foreign_s[index] = _last_s(self._foreign_s[index], MASTER in own, now_s)
