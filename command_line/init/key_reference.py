@@ -6,6 +6,7 @@ The documentation's reference is generated from this list, so it cannot differ f
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
+from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from control.bounds import Bounds, Meaning, unit_of
@@ -55,6 +56,8 @@ def _kind_text(kind: Any) -> str:
         return ", ".join(repr(word) for word in get_args(kind))
     if get_origin(kind) in (dict, tuple):
         return "table" if get_origin(kind) is dict else "array"
+    if get_origin(kind) is UnionType:  # a key without default that may be left out
+        kind = get_args(kind)[0]
     return "str or list" if kind is object else kind.__name__
 
 

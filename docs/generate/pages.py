@@ -11,10 +11,11 @@ from itertools import groupby
 from pathlib import Path
 
 from command_line.init.key_reference import Key, configuration_keys, is_required, toml_value
+from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
 from docs.generate.command_line import commands, exit_statuses
 from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
-from firmware_host.configuration.gait_file import PROTOCOLS
+from firmware_host.configuration.gait_file import PROTOCOLS, SHIPPED
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
 from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, SocketMethod
@@ -38,6 +39,16 @@ def sections() -> Iterator[str]:
         yield from ("", "```toml", example(section, keys), "```", "")
 
 
+def gaits() -> Iterator[str]:
+    head = ("key", "unit", "bounds", "default", "meaning")
+    for record, place in ((GaitPath, "the file"), (GaitPhase, "each `[[phase]]`"), (WayPoint, "each of `way_points`")):
+        yield f"Keys of {place}:"
+        yield from table(head, map(_key_row, configuration_keys(record, place)))
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED.glob("*.toml"))}
+    first_lines = [(code(name), text.splitlines()[0].lstrip("# ")) for name, text in texts.items()]
+    yield from table(("gait", "what it is"), first_lines)
+
+
 def example(section: str, keys: Sequence[Key]) -> str:
     """Return a section to copy: that of the example configuration, or one with every default."""
     begin = f"[{section}".replace("NAME", "") if section.endswith(".NAME") else f"[{section}]"
@@ -51,7 +62,8 @@ def example(section: str, keys: Sequence[Key]) -> str:
 
 def _key_row(key: Key) -> tuple[str, str, str, str, str]:
     bounds = f"{key.bounds.minimum:.10g} to {key.bounds.maximum:.10g}" if key.bounds else key.kind
-    default = "required" if is_required(key) else "" if key.default is MISSING else code(toml_value(key.default))
+    has_default = key.default is not MISSING and key.default is not None
+    default = "required" if is_required(key) else code(toml_value(key.default)) if has_default else ""
     return code(key.name), key.unit, bounds, default, key.meaning
 
 
@@ -98,6 +110,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "commands": commands,
     "exit_statuses": exit_statuses,
     "configuration": sections,
+    "gaits": gaits,
     "modes": modes,
     "reactions": reactions,
     "faults": faults,
