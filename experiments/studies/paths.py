@@ -125,7 +125,7 @@ def _truth_of(stride: StrideEstimate, clay: Clay) -> StrideTruth:
     return StrideTruth(
         flipper=stride.flipper,
         index=stride.index,
-        clay=clay,
+        ground=clay,
         surface_m=0.0,
         insertion=stroke(stride.k_p),
         stance=stroke(stride.k_s),
