@@ -79,6 +79,10 @@ class Client:
         depth = {"depths_m": list(depth_m)} if isinstance(depth_m, Sequence) else {"depth_m": depth_m}
         self._move("walk", strides=strides, **depth, **_texts(trial))
 
+    def stride(self, depth_m: float, **gait: float) -> None:
+        """Fix the depth of the present walk, and any of sweep_angle_deg and the speeds of its phases in m/s."""
+        self._client.call("stride", depth_m=depth_m, **gait)
+
     def trial(self, **defaults: object) -> Report:
         """Return `defaults` and the `present` description of walks; keywords change defaults, None removes one."""
         return dict(self._client.call("trial_set", **_texts(defaults)) if defaults else self._client.call("trial"))
@@ -112,8 +116,9 @@ class Client:
         self._client.call("clear")
 
     def renew(self) -> None:
-        """Renew the lease."""
-        self._client.call("lease", for_s=self._lease["lease_s"])
+        """Renew the lease, where this client has one."""
+        if self._leased:
+            self._client.call("lease", for_s=self._lease["lease_s"])
 
     def release(self) -> None:
         """End the lease."""
@@ -126,8 +131,7 @@ class Client:
         while (report := self.status())["mode"] != mode:
             if time.monotonic() > deadline_s:
                 raise TimeoutError(f"the robot is in mode {report['mode']} after {timeout_s:g} s, not in {mode}")
-            if self._leased:
-                self.renew()
+            self.renew()
             time.sleep(POLL_S)
         return report
 

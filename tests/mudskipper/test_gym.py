@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from typing import Any
 
 import gymnasium
@@ -9,20 +12,27 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from mudskipper.client import Client
 from mudskipper.gym import ACTION, MudWalk
-from simulation.mud.clay import Clay
-from simulation.mud.track import Track
+from mudskipper.stride_walks import SimulatedWalk
+from tests.folders import ROOT
+from tests.running_bench import Bench
 
 ENV = "mudskipper.gym:mudskipper/MudWalk-v0"
 
 
+def mud(strength_pa: float) -> dict[str, Any]:
+    return {"segment": [{"start_m": 0.0, "end_m": 10.0, "strength_pa": strength_pa}]}
+
+
 @pytest.mark.filterwarnings("error")
-def test_gymnasium_s_own_checker_finds_nothing() -> None:
-    check_env(gymnasium.make(ENV, render_mode="rgb_array", duration_s=4.0).unwrapped)
+@pytest.mark.parametrize("backend", ["direct", "lockstep"])
+def test_gymnasium_s_own_checker_finds_nothing(backend: str) -> None:
+    check_env(gymnasium.make(ENV, render_mode="rgb_array", backend=backend, duration_s=3.0).unwrapped)
 
 
 def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> None:
-    with gymnasium.make(ENV, duration_s=4.0, track=Track([(10.0, Clay("mud", 2000.0))])).unwrapped as walk:
+    with gymnasium.make(ENV, duration_s=4.0, world=mud(2000.0)).unwrapped as walk:
         assert isinstance(walk, MudWalk)
         _, info = walk.reset(seed=1)
         begun_m, advanced_m = info["body_m"], 0.0
@@ -30,8 +40,8 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
             felt, reward, fault, over, info = walk.step(np.array(action, np.float32))
             advanced_m += info["advance_m"]
             assert reward == pytest.approx(100.0 * info["advance_m"] - 0.1 * info["energy_j"])
-            assert walk._lockstep is not None
-            sweep_deg = walk._lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
+            assert isinstance(walk._walk, SimulatedWalk)
+            sweep_deg = walk._walk._lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
             assert sweep_deg == pytest.approx(ACTION["sweep_angle_deg"][int(action[1] > 0.0)])
         assert over and not fault
         assert felt[9] == pytest.approx(2.75, abs=0.5)  # cm of depth: the middle of its range
@@ -47,8 +57,62 @@ def test_the_same_seed_gives_the_same_walk_and_another_seed_another_ground() -> 
     assert walked(5) == walked(5) != walked(6)
 
 
+def test_a_daemon_and_no_buses_feel_and_pay_as_lockstep_does() -> None:
+    walks = []
+    for backend in ("lockstep", "direct", "daemon"):
+        with gymnasium.make(ENV, backend=backend, duration_s=1.0, world=mud(1500.0)) as walk:
+            walk.reset(seed=1)
+            felt, reward, fault, over, info = walk.step(np.array([0.2, 0.0, 0.0], np.float32))
+            assert over and not fault
+            walks.append((*felt[6:11].tolist(), info["advance_m"], info["energy_j"], reward))
+    lockstep, direct, daemon = walks
+    assert direct == pytest.approx(lockstep, rel=0.1)  # it arms at another tick, so the noise is another
+    assert daemon == pytest.approx(
+        lockstep, rel=0.25
+    )  # another wake-up of every tick, and energy from 50 reports a second
+
+
+def test_the_order_of_hashes_does_not_matter() -> None:
+    code = (
+        f"import gymnasium, numpy; w = gymnasium.make({ENV!r}, backend='direct', duration_s=1.0); w.reset(seed=3);"
+        "print(w.step(numpy.zeros(3, numpy.float32))[0].tolist())"
+    )
+    walked = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=os.environ | {"PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for hash_seed in ("1", "2")
+    }
+    assert len(walked) == 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"backend": "other"}, {"socket": "s"}, {"socket": "s", "backend": "daemon"}, {"operated": True}],
+)
+def test_a_robot_behind_a_socket_is_moved_only_with_an_operator(options: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="must be|needs"):
+        MudWalk(**options)
+
+
+def test_an_operator_arms_the_robot_of_a_socket_before_each_reset(bench: Bench) -> None:
+    with MudWalk(backend="daemon", socket=bench.socket, operated=True, duration_s=1.0) as walk:
+        with pytest.raises(RuntimeError, match="idle"):
+            walk.reset()
+        with Client(bench.socket) as operator:
+            operator.arm()
+            operator.wait_for("hold")
+            walk.reset()
+            _, _, fault, over, info = walk.step(np.zeros(3, np.float32))
+            assert over and not fault and info["advance_m"] > 0.01
+            assert operator.wait_for("hold")
+
+
 def test_the_robot_s_own_method_walks_where_actions_are_ignored() -> None:
-    with gymnasium.make(ENV, duration_s=1.0, adaptive=True, track=Track([(10.0, Clay("mud", 300.0))])) as walk:
+    with gymnasium.make(ENV, duration_s=1.0, adaptive=True, world=mud(300.0)) as walk:
         walk.reset(seed=1)
         felt, *_ = walk.step(np.full(3, -1.0, np.float32))
     assert felt[9] > 1.5  # cm, where the action says 1
