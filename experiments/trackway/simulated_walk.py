@@ -29,7 +29,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import MUDS, Clay
-from simulation.mud.disturbances import TRACKWAY
+from simulation.mud.disturbances import TRACKWAY, Disturbances
 from simulation.mud.track import Track
 
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -76,14 +76,15 @@ def walk_by(
     done: Callable[[Sequence[WalkedStride]], bool],
     depth_m: float = 0.0,
     method: str = "",
+    disturbances: Disturbances = TRACKWAY,
     **plant: Any,
 ) -> Walk:
-    """Walk until `done` accepts the strides so far, or a fault, with the disturbances of the trackway.
+    """Walk until `done` accepts the strides so far, or a fault.
 
     `plant` changes parameters of the simulated robot's body. Raises RuntimeError where the robot does not start.
     """
     robot = robot_of(method)
-    lockstep = Lockstep(robot, track, seed, disturbances=TRACKWAY, plant=plant_of(robot, TRACKWAY, **plant))
+    lockstep = Lockstep(robot, track, seed, disturbances=disturbances, plant=plant_of(robot, disturbances, **plant))
     lockstep.arm()
     lockstep.walk(WalkOrder(robot.adaptation.initial_depth_m if method else depth_m, adaptive=bool(method)))
     record = StrideRecord(lambda position_m: track.ground_at(position_m).name)
