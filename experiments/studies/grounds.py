@@ -43,16 +43,16 @@ GROWING = tuple(Layer(n * STEP_M, (n + 1) * STEP_M, sqrt((n + 0.5) * STEP_M / KN
 MIDDLE = Clay("1.4 kPa", 1400.0)
 SLOW = ThixotropicMud(MIDDLE, Thixotropy(recovery_s=600.0))
 GROUNDS: Mapping[str, Ground] = {
-    "clay 0.8 kPa": Clay("0.8 kPa", 800.0),
-    "clay 1.4 kPa": MIDDLE,
-    "clay 3.6 kPa": Clay("3.6 kPa", 3600.0),
-    "1.4 kPa at 3 cm, growing": Clay("growing", 1400.0, GROWING),
-    "crust over 0.8 kPa": Clay("crust", 800.0, (Layer(0.0, 0.008, 4.0),)),
-    "0.8 kPa over a floor": Clay("floor", 800.0, (Layer(0.03, 1.0, 20.0),)),
-    "thixotropic 1.4 kPa": ThixotropicMud(MIDDLE),
-    "thixotropic, slow": SLOW,
-    "sand, generic": Sand("sand", 1.55e6),
-    "sand, spatial": Sand("sand", 1.55e6, spatial=True),
+    "clay-0.8": Clay("0.8 kPa", 800.0),
+    "clay-1.4": MIDDLE,
+    "clay-3.6": Clay("3.6 kPa", 3600.0),
+    "growing": Clay("growing", 1400.0, GROWING),
+    "crust": Clay("crust", 800.0, (Layer(0.0, 0.008, 4.0),)),
+    "floor": Clay("floor", 800.0, (Layer(0.03, 1.0, 20.0),)),
+    "thixotropic": ThixotropicMud(MIDDLE),
+    "thixotropic-slow": SLOW,
+    "sand-generic": Sand("sand", 1.55e6),
+    "sand-spatial": Sand("sand", 1.55e6, spatial=True),
 }
 METHOD_STRIDES = 12
 ERRORS = ("median", "bias", "coverage", "strides", "bounds", "bounds_hold", "not_valid")

@@ -1,0 +1,53 @@
+"""Grounds are what their names say, and the study compares walks and estimates on each."""
+
+from typing import Any
+
+import pytest
+
+from control.geometry import FlipperGeometry
+from experiments.studies.grounds import GROUNDS, disturbances_on, study, walk
+from simulation.mud.disturbances import TRACKWAY
+from simulation.test_rig.load_cell import LoadCell
+from tests.experiments.studies.synthetic_trials import SyntheticTrials
+
+CM_S = {1.5: 1.0, 3.0: 4.0, 5.0: 2.0, 0.0: 3.8}
+
+
+def force_n(ground: str, depth_m: float) -> float:
+    """Return the force at the end of an insertion."""
+    return LoadCell(GROUNDS[ground], FlipperGeometry(), 0.0, 0.0).lower(depth_m, 0.1)[-1][2]
+
+
+def test_a_crust_gives_way_a_floor_does_not_and_strength_that_grows_is_the_clay_s_at_3_cm() -> None:
+    assert force_n("crust", 0.006) > 1.3 * force_n("crust", 0.012)
+    assert force_n("floor", 0.035) > 5.0 * force_n("floor", 0.029)
+    assert force_n("floor", 0.029) == pytest.approx(force_n("clay-0.8", 0.029))
+    growing, clay = GROUNDS["growing"], GROUNDS["clay-1.4"]
+    assert growing.bearing_pa(0.033) == pytest.approx(clay.bearing_pa(0.033), rel=0.06)
+    assert growing.bearing_pa(0.009) == pytest.approx(clay.bearing_pa(0.009) * 0.3**0.5, rel=1e-6)
+
+
+def test_a_ground_has_no_disturbance_twice_and_dry_sand_does_not_cling() -> None:
+    mud, sand = (disturbances_on(GROUNDS[name], TRACKWAY) for name in ("thixotropic", "sand-generic"))
+    assert (mud.remoulding, mud.clinging_n, sand.clinging_n) == (0.0, TRACKWAY.clinging_n, 0.0)
+    assert disturbances_on(GROUNDS["clay-1.4"], TRACKWAY) == TRACKWAY
+
+
+def test_the_robot_walks_on_sand() -> None:
+    walked = walk("sand-generic", 3.0, 1)
+    assert 3.0 < walked["cm_s"] < 9.0 and walked["stuck"] == 0
+
+
+def test_the_study_compares_the_choice_with_the_best_constant_depth_and_counts_intervals() -> None:
+    def measure(ground: str, seed: int, depth_cm: float = 0.0, setup: str = "") -> dict[str, Any]:
+        if not setup:
+            return {"cm_s": CM_S[depth_cm], "stuck": int(depth_cm == 5.0), "strides": 6, "chosen_cm": depth_cm or 2.8}
+        named = {"mud": ground, "setup": setup, "method": "default", "trial": str(seed), "coefficient": "k_s"}
+        values = {"kind": "value", "value": 1.0 + 0.1 * seed, "truth": 1.0, "std_error": 0.1, "repeatability": 0.1}
+        return {"rows": [named | values]}
+
+    result = study(SyntheticTrials(measure), ground=("crust",), depth=(1.5, 3.0, 5.0), seeds=1, estimates=2)
+    speeds, errors = (table.rows for table in result.tables)
+    assert speeds.iloc[0][["of the best", "stuck, constant", "stuck, chosen"]].tolist() == ["95 %", "1/18", "0/6"]
+    assert errors[["coverage", "strides"]].drop_duplicates().to_numpy().tolist() == [[0.5, 2]]
+    result.figures[0].draw()
