@@ -136,7 +136,12 @@ def estimate(ground: str, setup: str, seed: int) -> dict[str, Any]:
     known = EstimationParameters(fixed_base=own.fixed_base, surface_error_m=LAB.surface_error_m)
     rows: list[dict[str, Any]] = []
     for stride, _ in replay_trial(trial, known):
-        keys = {"mud": ground, "setup": own.name, "method": "default", "trial": f"{seed} {stride.flipper}"}
+        keys: dict[str, Any] = {
+            "mud": ground,
+            "setup": own.name,
+            "method": "default",
+            "trial": f"{seed} {stride.flipper}",
+        }
         truth = truths.get((stride.flipper, stride.index), {})
         rows += [row for row in compared_rows(stride_report(stride), truth, **keys) if row["truth"] is not None]
     return {"rows": rows}
