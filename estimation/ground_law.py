@@ -9,23 +9,24 @@ thickness t at the depth z has, per unit of strength,
 Mud is undrained clay: bearing under the edge (N_c = 5.14) or suction (9), adhesion on all sides (a = 0.25), and across
 the plate Matlock's pressure (1970) from 3 at the surface, with J = 0.5. Sand is resistive-force theory of a plate on
 edge (Li, Zhang and Goldman 2013, their generic coefficients): a plate that is drawn up hardly loads it, where mud holds
-a plate that leaves it. So the evidence is in k_e. The strength of a law is the mean of two coefficients, and its error
-is how wrong it predicts the third one from them.
+a plate that leaves it. So the evidence is in k_e. Each coefficient is predicted by the strength that the others have by
+a law, and the law's error is how wrong that is. (A k_s that is a lower bound, as in firm ground, is left out.)
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import exp, fsum, log, sqrt
-from typing import NamedTuple
+from statistics import median
+from typing import Any, NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.mud_estimate import MudEstimate
 from control.plate_integrals import mean_width_m
+from control.records import StrideEstimate
 
 BEARING, SUCTION, ADHESION = 5.14, 9.0, 0.25
 PRESSURE_AT_SURFACE, MATLOCK_J = 3.0, 0.5
 DOWN, ACROSS, UP = 0.128, 0.370, 0.054
 LARGEST_ERROR = 0.5  # of a logarithm: real grounds differ from their laws by a quarter to a third
-CLEARLY = 2.0  # times the error of the better law
+CLEARLY = log(2.0)  # more error of the other law: it is wrong by a further factor of two
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 UNDECIDED = "undecided"
 Reading = tuple[float, float]  # a coefficient in N/m³, and the depth below the surface in m to which it belongs
@@ -53,25 +54,39 @@ LAWS: dict[str, Callable[[str, float, float, float], float]] = {"mud": _of_mud, 
 
 
 def law_evidence(geometry: FlipperGeometry, readings: Mapping[str, Reading]) -> LawEvidence | None:
-    """Return which law explains the readings of one ground, by coefficient; None unless there are all three."""
-    if not all(name in readings and min(readings[name]) > 0.0 for name in COEFFICIENTS):
+    """Return which law explains the readings of one ground, by coefficient; None without k_e and another one."""
+    known = {name: reading for name, reading in readings.items() if min(reading) > 0.0}
+    if "k_e" not in known or len(known) < 2:
         return None
     errors = {}
     for law, value in LAWS.items():
-        strengths = []
-        for name in COEFFICIENTS:
-            k, depth_m = readings[name]
-            strengths.append(log(k / value(name, mean_width_m(geometry, depth_m), geometry.plate_thickness_m, depth_m)))
-        others = [(fsum(strengths) - each) / 2.0 for each in strengths]
+        strengths = [
+            log(k / value(name, mean_width_m(geometry, depth_m), geometry.plate_thickness_m, depth_m))
+            for name, (k, depth_m) in known.items()
+        ]
+        others = [(fsum(strengths) - each) / (len(strengths) - 1) for each in strengths]
         errors[law] = sqrt(fsum((a - b) ** 2 for a, b in zip(strengths, others, strict=True)) / len(strengths))
     better, worse = sorted(errors, key=errors.__getitem__)[:2]
-    holds = errors[better] <= LARGEST_ERROR and errors[worse] >= CLEARLY * errors[better]
+    holds = errors[better] <= LARGEST_ERROR and errors[worse] >= errors[better] + CLEARLY
     return LawEvidence(better if holds else UNDECIDED, {law: exp(error) - 1.0 for law, error in errors.items()})
 
 
-def law_of_estimate(geometry: FlipperGeometry, mud_estimate: MudEstimate) -> LawEvidence | None:
-    """Return the evidence in what the robot remembers of the ground; a lower bound is none."""
-    known = {name: getattr(mud_estimate, name) for name in COEFFICIENTS}
-    return law_evidence(
-        geometry, {name: (k.value, k.depth_m) for name, k in known.items() if k is not None and not k.at_least}
-    )
+def readings_of(measured: Iterable[tuple[str, Any]]) -> dict[str, Reading]:
+    """Return the medians of the strides' coefficients, which are estimates or rows of a table with the same names.
+
+    A k_e that is too small to be told from nothing, as in sand, counts with its error, as the most that it may be.
+    """
+    values: dict[str, list[Reading]] = {name: [] for name in COEFFICIENTS}
+    faint: list[Reading] = []
+    for name, each in measured:
+        if each.valid and not each.at_least:
+            values[name].append((each.value, each.depth_m))
+        elif name == "k_e" and not each.at_least and each.value + each.std_error > 0.0 and each.depth_m > 0.0:
+            faint.append((each.value + each.std_error, each.depth_m))
+    values["k_e"] = values["k_e"] or faint
+    return {name: (median(k for k, _ in found), median(z for _, z in found)) for name, found in values.items() if found}
+
+
+def law_of_strides(geometry: FlipperGeometry, strides: Iterable[StrideEstimate]) -> LawEvidence | None:
+    """Return the evidence in the strides of one ground."""
+    return law_evidence(geometry, readings_of((name, getattr(each, name)) for each in strides for name in COEFFICIENTS))

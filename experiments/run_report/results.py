@@ -21,7 +21,7 @@ from pandas import DataFrame
 
 from control.faults import FAULT_KINDS, Reaction
 from control.records import UNKNOWN
-from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence
+from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence, readings_of
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
@@ -91,7 +91,7 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
     estimates = run.estimates[run.estimates["mud"] == mud]
     by_flipper = {flipper: estimates[estimates["flipper"] == flipper] for flipper in run.replay.flippers}
     values = estimates[estimates["valid"] & ~estimates["at_least"]]
-    law = _ground_law(run, values)
+    law = _ground_law(run, estimates)
     return {
         "mud": mud,
         "strides": len(strides),
@@ -126,10 +126,9 @@ def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
     return {name: gather_coefficient(estimates[estimates["coefficient"] == name]) for name in COEFFICIENTS}
 
 
-def _ground_law(run: Run, values: DataFrame) -> LawEvidence | None:
-    """Return which ground's law the medians of a mud's strides follow."""
-    medians = values.groupby("coefficient")[["value", "depth_m"]].median()
-    readings = {str(name): (float(row["value"]), float(row["depth_m"])) for name, row in medians.iterrows()}
+def _ground_law(run: Run, estimates: DataFrame) -> LawEvidence | None:
+    """Return which ground's law the strides of a mud follow."""
+    readings = readings_of((row.coefficient, row) for row in estimates.itertuples())
     return law_evidence(run.walks[0].geometry, readings) if run.walks else None
 
 

@@ -21,6 +21,7 @@ from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath
 from control.records import JOINTS, UNKNOWN
+from estimation.ground_law import law_of_strides
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.gait_checks import gait_problems
 from firmware_host.configuration.gait_file import read_gait
@@ -30,6 +31,7 @@ from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.reports import (
     cause_report,
     known,
+    law_report,
     load_report,
     map_report,
     mud_estimate_report,
@@ -53,6 +55,7 @@ Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
 SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
+LAW_STRIDES = 5  # of each flipper, from which the law of the ground is found
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
@@ -130,7 +133,7 @@ class OperatorCalls:
             "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
             "stride_supply_min_v": self._stride_supply_v(),
-            "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig, loop.configuration.geometry),
+            "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig) | {"law": self._law_report()},
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
             "trial": self._trials.present,
@@ -138,6 +141,11 @@ class OperatorCalls:
             "bus": _bus_report(loop),
             "log": _log_report(loop, now_s),
         }
+
+    def _law_report(self) -> dict[str, Any] | None:
+        strides = self._loop.learning.strides[-LAW_STRIDES * len(self._rig.flippers) :]
+        geometry = self._loop.configuration.geometry
+        return law_report(law_of_strides(geometry, [closed.estimate for closed in strides]))
 
     def _fault_reports(self) -> dict[str, Any]:
         """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""

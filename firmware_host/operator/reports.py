@@ -10,10 +10,9 @@ from typing import Any
 
 from control.fault_causes import Cause
 from control.faults import FaultKind
-from control.geometry import FlipperGeometry
 from control.mud_estimate import Coefficient, MudEstimate
 from control.records import Estimate, FlipperLoad, Rig, StrideEstimate
-from estimation.ground_law import LawEvidence, law_of_estimate
+from estimation.ground_law import LawEvidence
 from estimation.mud_map import Mapped, MapRow
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
@@ -50,11 +49,10 @@ def _coefficient_reports(record: object) -> dict[str, Any]:
     return {name: estimate and estimate_report(estimate) for name, estimate in found.items()}
 
 
-def mud_estimate_report(mud_estimate: MudEstimate, rig: Rig, geometry: FlipperGeometry) -> dict[str, Any]:
-    """Return the estimate of all flippers together and of each, and which law the ground follows."""
+def mud_estimate_report(mud_estimate: MudEstimate, rig: Rig) -> dict[str, Any]:
+    """Return the estimate of all flippers together, and of each."""
     apart = {flipper: _coefficient_reports(mud_estimate.of(flipper)) for flipper in rig.flippers}
-    law = law_report(law_of_estimate(geometry, mud_estimate))
-    return _coefficient_reports(mud_estimate) | apart | {"boundary": mud_estimate.boundary, "law": law}
+    return _coefficient_reports(mud_estimate) | apart | {"boundary": mud_estimate.boundary}
 
 
 def law_report(evidence: LawEvidence | None) -> dict[str, Any] | None:

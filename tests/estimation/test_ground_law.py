@@ -1,14 +1,14 @@
 """Which law a ground follows, from how its three coefficients compare."""
 
-from collections.abc import Mapping
 from math import exp
 from random import Random
+from typing import Any
 
 import pytest
 
 from control.geometry import FlipperGeometry
-from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
-from estimation.ground_law import ACROSS, COEFFICIENTS, DOWN, LAWS, UNDECIDED, UP, law_evidence, law_of_estimate
+from control.records import UNKNOWN, Estimate
+from estimation.ground_law import ACROSS, DOWN, LAWS, UNDECIDED, UP, law_evidence, readings_of
 
 GEOMETRY = FlipperGeometry()
 STRENGTHS = {"mud": 2000.0, "sand": 1.8e6}  # Pa; N/m³
@@ -45,26 +45,41 @@ def test_grounds_that_differ_from_their_law_are_seldom_named_wrong() -> None:
     assert named["mud"] + named["sand"] >= 280
 
 
-@pytest.mark.parametrize("missing", COEFFICIENTS)
-def test_two_coefficients_show_no_law(missing: str) -> None:
-    known = readings("mud")
-    assert law_evidence(GEOMETRY, {name: each for name, each in known.items() if name != missing}) is None
-    assert law_evidence(GEOMETRY, known | {missing: (0.0, 0.03)}) is None
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("missing", ["k_p", "k_s"])
+def test_the_extraction_and_one_other_coefficient_suffice(missing: str, law: str) -> None:
+    known = {name: each for name, each in readings(law).items() if name != missing}
+    evidence = law_evidence(GEOMETRY, known)
+    assert evidence is not None and evidence.name == law
 
 
-def test_a_lower_bound_shows_no_law() -> None:
-    def estimate(bounds: Mapping[str, bool]) -> MudEstimate:
-        own = FlipperEstimate(
-            **{
-                name: Coefficient(k, 0.1 * k, 0.1 * k, depth_m, -0.5, 0.3, 3, bounds.get(name, False))
-                for name, (k, depth_m) in readings("mud").items()
-            }
-        )
-        return MudEstimate(k_p=own.k_p, k_s=own.k_s, k_e=own.k_e)
+@pytest.mark.parametrize("known", [["k_p", "k_s"], ["k_e"], []])
+def test_nothing_is_said_without_the_extraction_and_another_coefficient(known: list[str]) -> None:
+    found = readings("mud")
+    assert law_evidence(GEOMETRY, {name: found[name] for name in known}) is None
+    assert law_evidence(GEOMETRY, {name: found[name] for name in known} | {"k_e": (0.0, 0.02)}) is None
 
-    evidence = law_of_estimate(GEOMETRY, estimate({}))
-    assert evidence is not None and evidence.name == "mud"
-    assert law_of_estimate(GEOMETRY, estimate({"k_s": True})) is None
+
+def estimates(law: str, **changes: dict[str, Any]) -> list[tuple[str, Estimate]]:
+    found = []
+    for name, (k, depth_m) in readings(law).items():
+        plain = Estimate(k, 0.1 * k, 9, True, repeatability=0.1 * k, depth_m=depth_m)
+        found.append((name, plain._replace(**changes.get(name, {}))))
+    return found
+
+
+def test_lower_bounds_are_left_out() -> None:
+    bound = {"at_least": True}
+    assert set(readings_of(estimates("mud", k_s=bound))) == {"k_p", "k_e"}
+    assert law_evidence(GEOMETRY, readings_of(estimates("mud", k_s=bound, k_p=bound))) is None
+
+
+def test_an_extraction_that_is_too_faint_to_be_told_from_nothing_is_that_of_sand() -> None:
+    faint = {"value": 1e4, "std_error": 2e4, "valid": False}
+    evidence = law_evidence(GEOMETRY, readings_of(estimates("sand", k_e=faint)))
+    assert evidence is not None and evidence.name != "mud"
+    unknown = {"value": UNKNOWN, "std_error": UNKNOWN, "valid": False}
+    assert "k_e" not in readings_of(estimates("sand", k_e=unknown))
 
 
 def test_the_constants_of_sand_are_those_of_the_published_map() -> None:
