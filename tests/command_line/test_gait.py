@@ -1,0 +1,39 @@
+"""`mudskipper gait`: exit statuses, and the picture."""
+
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from tests.command_line.command_lines import run
+
+SWING = '[[phase]]\nname = "swing"\nduration_s = 0.8\nway_points = [{ sweep_deg = 20.0, depth_m = -0.01 }]\n'
+STANCE = '[[phase]]\nname = "stance"\nspeed_m_s = 0.3\nway_points = [{ sweep_deg = -20.0, depth_m = -0.01 }]\n'
+
+
+def test_a_gait_that_is_checked_is_drawn(tmp_path: Path) -> None:
+    picture = tmp_path / "path.png"
+    assert run("gait", "check", "ellipse", "--out", str(picture)).returncode == exit_codes.OK
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        (STANCE + SWING, exit_codes.OK),
+        (STANCE, exit_codes.CONFIGURATION),
+        (STANCE.replace("sweep_deg", "sweep") + SWING, exit_codes.CONFIGURATION),
+        ("phase = 1", exit_codes.CONFIGURATION),
+        ("[[phase", exit_codes.CONFIGURATION),
+        ("", exit_codes.CONFIGURATION),
+    ],
+)
+@pytest.mark.parametrize("command", ["check", "simulate"])
+def test_a_file_of_ones_own_is_accepted_or_named(tmp_path: Path, text: str, status: int, command: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f"depths_m = [0.02]\n{text}" if text else "", encoding="utf-8")
+    arguments = ["--strides", "1"] if command == "simulate" else []
+    found = run("gait", command, str(path), *arguments)
+    assert found.returncode == status
+    assert "Traceback" not in found.stderr
+    assert status == exit_codes.OK or "mine.toml" in found.stderr
