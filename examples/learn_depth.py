@@ -20,7 +20,9 @@ LEAST_K = 0.01  # N/cm³, where none is known
 
 def reward(policy, seed, adaptive=False):
     """Return the reward of a walk over the track of this seed."""
-    walk = gymnasium.make("mudskipper.gym:mudskipper/MudWalk-v0", duration_s=DURATION_S, adaptive=adaptive)
+    walk = gymnasium.make(
+        "mudskipper.gym:mudskipper/MudWalk-v0", backend="direct", duration_s=DURATION_S, adaptive=adaptive
+    )
     felt, _ = walk.reset(seed=seed)
     rewards, over = [], False
     while not over:
