@@ -104,6 +104,7 @@ class FlipperEstimator(StrideEstimator):
         self._own_surfaces.reset()
         self._extractions.reset()
         self._travel_m = self._swept_m = UNKNOWN
+        self._along_path = False  # the stroke under way is a part of a path
         self._slides_outward = False  # the body moves while the flipper goes down or up
         self._direction = 1.0  # of a stance that pushes the body forward: it begins in front of the joint; -1: backward
         self._is_fitting = self._is_taring = False  # the work of the last insertion
@@ -175,6 +176,7 @@ class FlipperEstimator(StrideEstimator):
             self._finish_insertion()
             self._strokes[ended].close(now_s, self._travel_m)
         if ended is Phase.INSERTION:
+            self._along_path = self._is_path
             self._slides_outward = self._is_path and self.base is Base.FREE
             self._is_fitting = self._is_taring = True
             self.work.add(self._learn_insertion(self._strokes[Phase.INSERTION], self._is_path))
@@ -248,6 +250,8 @@ class FlipperEstimator(StrideEstimator):
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         if self._direction < 0.0 and stance.batches and stance.batches[0].travel_m < stance.batches[-1].travel_m:
             stance.mirror()
+        if self._along_path:
+            stance.keep_deep(self.geometry)
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
             dragged = self._air.is_dragging(self._pushed_nm(stance.batches))
