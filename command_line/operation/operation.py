@@ -73,29 +73,30 @@ def arm(
     return _change_mode("arm", "hold", socket, params, WAITING_S if wait else 0.0)
 
 
+Depths = Annotated[  # the daemon knows the robot's limit
+    tuple[float, ...],
+    Option(
+        "insertion depth of every stride, or of the strides in turn",
+        unit="cm",
+        low=LEAST_DEPTH_CM,
+        high=20.0,
+        alternative="depth",
+    ),
+]
+Adaptive = Annotated[bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")]
+Water = Annotated[float | None, Option("water content of the mud", low=0.0, high=100.0, unit="%", metavar="W")]
+
+
 def walk(
     *,
     socket: Socket,
     json: Json = False,
-    depth: Annotated[  # the daemon knows the robot's limit
-        tuple[float, ...],
-        Option(
-            "insertion depth of every stride, or of the strides in turn",
-            unit="cm",
-            low=LEAST_DEPTH_CM,
-            high=20.0,
-            alternative="depth",
-        ),
-    ] = (),
-    adaptive: Annotated[
-        bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
-    ] = False,
+    depth: Depths = (),
+    adaptive: Adaptive = False,
     gait: Annotated[str, Option("walk the gait of this file, or of one that ships", metavar="FILE")] = "",
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
     mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
-    water: Annotated[
-        float | None, Option("water content of the mud", low=0.0, high=100.0, unit="%", metavar="W")
-    ] = None,
+    water: Water = None,
     trial: Annotated[str, Option("number or name of the trial", metavar="NAME")] = "",
     operator: Annotated[str, Option("who operates the robot", metavar="NAME")] = "",
     tag: Annotated[tuple[str, ...], Option("word that finds this walk again", metavar="WORD")] = (),
