@@ -105,7 +105,6 @@ class FlipperEstimator(StrideEstimator):
         self._extractions.reset()
         self._travel_m = self._swept_m = UNKNOWN
         self._along_path = False  # the stroke under way is a part of a path
-        self._slides_outward = False  # the body moves while the flipper goes down or up
         self._direction = 1.0  # of a stance that pushes the body forward: it begins in front of the joint; -1: backward
         self._is_fitting = self._is_taring = False  # the work of the last insertion
         self._waiting: list[tuple[float, Phase, JointLoad, float]] = []  # samples, until the tare is corrected
@@ -177,7 +176,6 @@ class FlipperEstimator(StrideEstimator):
             self._strokes[ended].close(now_s, self._travel_m)
         if ended is Phase.INSERTION:
             self._along_path = self._is_path
-            self._slides_outward = self._is_path and self.base is Base.FREE
             self._is_fitting = self._is_taring = True
             self.work.add(self._learn_insertion(self._strokes[Phase.INSERTION], self._is_path))
         elif ended is Phase.EXTRACTION:
@@ -267,7 +265,7 @@ class FlipperEstimator(StrideEstimator):
             zero=self._tare.zero,
             tare_drift_n=self._tare.drift_n,
             friction_error_nm=self._air.std_error_nm,
-            outward_uncertainty=OUTWARD_UNCERTAINTY if self._slides_outward else 0.0,
+            outward_uncertainty=OUTWARD_UNCERTAINTY if self._along_path and self.base is Base.FREE else 0.0,
         )
         return self._learn_stride(stride)
 

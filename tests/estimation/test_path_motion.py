@@ -1,17 +1,18 @@
 """Coefficients from paths that are no crutching gait, through mud that keeps the laws, so that the truth is known."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import cos, pi, radians, sin
 
 import pytest
 
+from control.parameters.gait_parameters import GaitParameters
 from control.plate_integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
 from estimation.path_motion import TURNED_M, PathMotion
 from estimation.strokes.shear import Base
-from tests.estimation.synthetic_strides import GEOMETRY, RATE_HZ, WEIGHTLESS, Moment, loaded, noisy, update, walked
+from tests.estimation.synthetic_strides import GEOMETRY, RATE_HZ, WEIGHTLESS, Moment, Row, loaded, noisy, update, walked
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 0.7e6
 DRIVE = FlipperDrive(WEIGHTLESS, 0.083, 0.083)
@@ -51,8 +52,12 @@ def torques_nm(moment: Moment) -> tuple[float, float]:
 
 
 def strides_of(moments: Sequence[Moment]) -> Iterator[StrideEstimate]:
-    flipper = FlipperEstimator("left", GEOMETRY, DRIVE, Base.FIXED, surface_error_m=KNOWN_M)
-    for row in noisy(loaded(moments, torques_nm, DRIVE), 1, 0.05):
+    return estimated(noisy(loaded(moments, torques_nm, DRIVE), 1, 0.05), Base.FIXED)
+
+
+def estimated(rows: Iterable[Row], base: Base) -> Iterator[StrideEstimate]:
+    flipper = FlipperEstimator("left", GEOMETRY, DRIVE, base, surface_error_m=KNOWN_M)
+    for row in rows:
         closed = update(flipper, *row)[1]
         if closed is not None:
             yield closed
@@ -96,3 +101,27 @@ def test_noise_turns_no_path() -> None:
     parts = [motion.update(depth_m, depth_m > 0.0) for depth_m in falling_m]
     assert parts[-1] is Phase.INSERTION
     assert Phase.EXTRACTION not in parts
+
+
+def test_a_bound_of_a_path_is_that_of_its_deep_part() -> None:
+    """Mud of one pressure everywhere holds the plate while the body moves: a shallow plate seems to meet firmer mud.
+
+    The flipper goes down and up slowly, as in an alternating gait, so the shallow part is long.
+    """
+    pressure_pa = 2000.0
+
+    def even_nm(moment: Moment) -> tuple[float, float]:
+        plate = submerged_plate(GEOMETRY, moment.sweep_rad, moment.adduction_rad)
+        sweep_nm = pressure_pa * (GEOMETRY.flipper_length_m * plate.area_m2 + plate.area_outward_m3)
+        return sweep_nm, cross_coupling(GEOMETRY, plate, moment.sweep_rad) * sweep_nm
+
+    slow = GaitParameters(insertion_speed_m_s=0.02, extraction_speed_m_s=0.02)
+    moments = [moment._replace(phase=Phase.STROKE) for moment in walked(gait=slow, strides=3)]
+    tilted = [m._replace(sweep_rad=m.sweep_rad - 10.0 * m.depth_m) for m in moments]  # sweeps on its way down
+    rows = loaded(tilted, even_nm, DRIVE)
+    held = [row._replace(body_m=-GEOMETRY.flipper_length_m * sin(row.sweep.angle_rad)) for row in rows]
+    strides = list(estimated(held, Base.FREE))
+    assert len(strides) == 3
+    for stride in strides:
+        assert (stride.stance, stride.k_s.at_least) == ("limited_by_body", True)
+        assert stride.k_s.value <= 2.0 * pressure_pa / (0.7 * DEPTH_M)  # of a plate that reaches 0.7 of the depth
