@@ -13,7 +13,8 @@ sink by as much, the mud would have to yield in the other direction. The first a
 stance, to the rear in a walk forward, and takes the body along. The later ones rock away from the middle on the
 flipper's side, where the lever l cos α of the mud that sticks to the plate is shorter too.
 
-In simulated clay of up to 9 kPa, at commanded depths of 3 to 5 cm, every flipper came out within 12 s; the body moved
+In simulated clay of up to 9 kPa, at commanded depths of 3 to 5 cm, the flippers of a first stride came out within 12 s
+(in walks of four strides at 4 to 5 cm all came out in 7 and 9 kPa; in 8 kPa those of the third stayed); the body moved
 8 to 11 cm forward meanwhile, and never more than 4 mm back. A steady pull freed no flipper from 6 kPa and 5 cm on;
 rocking at half the rate, or equally long in both directions, did not free 9 kPa, and with bodies of half or three times
 the mass some flippers stayed stuck from 7.5 kPa on. Real mud may differ: it has not been tried there.
