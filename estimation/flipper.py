@@ -70,7 +70,7 @@ class ClosingStride(NamedTuple):
     zero: Zero
     tare_drift_n: float
     friction_error_nm: float
-    outward_uncertainty: float  # of k_p and k_e
+    along_path: bool
 
 
 class FlipperEstimator(StrideEstimator):
@@ -248,8 +248,6 @@ class FlipperEstimator(StrideEstimator):
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         if self._direction < 0.0 and stance.batches and stance.batches[0].travel_m < stance.batches[-1].travel_m:
             stance.mirror()
-        if self._along_path:
-            stance.keep_deep(self.geometry)
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
             dragged = self._air.is_dragging(self._pushed_nm(stance.batches))
@@ -265,14 +263,14 @@ class FlipperEstimator(StrideEstimator):
             zero=self._tare.zero,
             tare_drift_n=self._tare.drift_n,
             friction_error_nm=self._air.std_error_nm,
-            outward_uncertainty=OUTWARD_UNCERTAINTY if self._along_path and self.base is Base.FREE else 0.0,
+            along_path=self._along_path,
         )
         return self._learn_stride(stride)
 
     def _learn_stride(self, stride: ClosingStride) -> Work[Learned]:
         """Fit k_s and k_e; the next stride may have begun, so no state of the stride under way is read."""
         stance, extraction, surface = stride.stance, stride.extraction, stride.surface
-        shear = find_shear(self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n)
+        shear = find_shear(self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n, stride.along_path)
         yield
         k_e = yield from self._learn_extraction(stride)
         yield
@@ -281,10 +279,11 @@ class FlipperEstimator(StrideEstimator):
             k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
             k_e=partial(extraction_samples, self.geometry, extraction.moving(), surface, extraction.first_m),
         )
+        outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0
         return Learned(
-            k_p=_widened(_named(stride.k_p, surface), stride.outward_uncertainty),
+            k_p=_widened(_named(stride.k_p, surface), outward),
             k_s=_named(self._shear_estimate(shear, stride), surface),
-            k_e=_widened(_named(k_e, surface), stride.outward_uncertainty),
+            k_e=_widened(_named(k_e, surface), outward),
             surface_m=surface.depth_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
             surface_std_error_m=surface.std_error_m,

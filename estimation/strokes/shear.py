@@ -35,6 +35,7 @@ QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
 CLIPPED = 0.3  # of the samples of a stance: the mean force is then that of the motor within a few percent
+DEEP_FRACTION = 0.7  # of the deepest part of a path
 MOTOR, BODY = "limited_by_motor", "limited_by_body"
 
 
@@ -56,24 +57,34 @@ class Shear(NamedTuple):
 
 
 def find_shear(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, base: Base, drag_n: float
+    geometry: FlipperGeometry,
+    batches: Sequence[Batch],
+    surface_m: float,
+    base: Base,
+    drag_n: float,
+    along_path: bool = False,
 ) -> Shear:
-    """Fit k_s, or find a lower bound, from the batches of one stance; `drag_n` is the body's drag on each flipper."""
+    """Fit k_s, or find a lower bound, from the batches of one stance; `drag_n` is the body's drag on each flipper.
+
+    A path goes through all depths. Mud seems the firmer the shallower a plate is, so a bound is that of its deep part.
+    """
     moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
+    least_m4 = DEEP_FRACTION**2 * max(moments, default=0.0) if along_path else 0.0
+    held = [moment if moment >= least_m4 else 0.0 for moment in moments]
     if not any(moment > 0.0 for moment in moments):
         return Shear(None, False, "unknown", 0, "no depth in any batch")
     clipped = sum([batch.samples for batch in batches if batch.saturated])
     if clipped > CLIPPED * sum([batch.samples for batch in batches]):
-        return _bound(geometry, MOTOR, "a motor at its limit", batches, moments)
+        return _bound(geometry, MOTOR, "a motor at its limit", batches, held)
     slips = slips_m(geometry, batches, base)
     if slips is None:
-        return _without_pose(geometry, batches, moments, drag_n)
+        return _without_pose(geometry, batches, moments, held, drag_n)
     steady = _yielding(geometry, batches, slips)
     if len(steady) >= MIN_BATCHES:
         return _value(_case(geometry, batches, slips), steady, batches, moments)
     if any(batch.saturated for batch in batches):
-        return _bound(geometry, MOTOR, "a motor at its limit", batches, moments)
-    return _bound(geometry, BODY, "the mud held: the body moved", batches, moments)
+        return _bound(geometry, MOTOR, "a motor at its limit", batches, held)
+    return _bound(geometry, BODY, "the mud held: the body moved", batches, held)
 
 
 def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> float:
@@ -147,7 +158,11 @@ def _case(geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[f
 
 
 def _without_pose(
-    geometry: FlipperGeometry, batches: Sequence[Batch], moments: Sequence[float], drag_n: float
+    geometry: FlipperGeometry,
+    batches: Sequence[Batch],
+    moments: Sequence[float],
+    held: Sequence[float],
+    drag_n: float,
 ) -> Shear:
     """Fit or bound k_s without a pose: flippers that push less than the body's drag cannot have moved it."""
     thrusts_n = [cos(b.sweep_rad) * b.sweep_nm / geometry.flipper_length_m for b in batches]
@@ -155,7 +170,7 @@ def _without_pose(
         steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
         if len(steady) >= MIN_BATCHES:
             return _value("yield", steady, batches, moments)
-    return _bound(geometry, "unknown", "no pose: the body may have moved", batches, moments)
+    return _bound(geometry, "unknown", "no pose: the body may have moved", batches, held)
 
 
 def _bound(

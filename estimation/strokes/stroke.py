@@ -7,12 +7,10 @@ a standard error depends on travelled distance and not on the number of messages
 
 from typing import NamedTuple
 
-from control.geometry import FlipperGeometry
 from control.records import UNKNOWN
 
 LONGEST = 60  # batches: twice those of the longest stroke; later ones are dropped
 MOVING = 0.6  # of the median speed; below it the flipper starts or stops
-DEEP_FRACTION = 0.7  # of the deepest batch of a path
 MOSTLY = 0.3  # fraction of saturated samples from which a batch counts as saturated
 
 
@@ -100,12 +98,6 @@ class Stroke:
                 )
             )
         self._empty()
-
-    def keep_deep(self, geometry: FlipperGeometry) -> None:
-        """Drop what is shallow: a path goes through all depths, and the mud's resistance belongs to the deepest."""
-        depths_m = [geometry.depth_m(batch.sweep_rad, batch.adduction_rad) for batch in self.batches]
-        deep_m = DEEP_FRACTION * max(depths_m, default=0.0)
-        self.batches = [batch for batch, depth_m in zip(self.batches, depths_m, strict=True) if depth_m >= deep_m]
 
     def mirror(self) -> None:
         """Turn a stroke that pushes the body backward into the one that pushes it forward: front and rear change."""

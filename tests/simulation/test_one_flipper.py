@@ -68,7 +68,7 @@ def test_it_walks_on_a_fixed_base_and_learns_the_mud(walked: Walked) -> None:
     assert [(stride.flipper, stride.index) for stride in strides] == [("right", index) for index in range(STRIDES)]
     assert all(stride.k_p.valid and stride.k_s.valid and stride.k_e.valid for stride in strides)
     assert [drive["joint"] for drive in status["drives"]] == ["right_sweep", "right_adduction"]
-    assert status["loads"].keys() == {"right"} == status["mud"].keys() - {"k_p", "k_s", "k_e", "boundary"}
+    assert status["loads"].keys() == {"right"} == status["mud"].keys() - {"k_p", "k_s", "k_e", "boundary", "law"}
 
 
 def test_its_log_names_its_joints_and_replays_to_the_last_digit_with_its_own_rig(walked: Walked) -> None:

@@ -120,7 +120,7 @@ REFUSED = {
     "[grid]\nmud.strength_pa = [800.0]": "mud.strength_pa: must begin with one of walk., robot., world.",
     f"[grid]\n{MUD} = [20.0]": "world.segment 1.strength_pa = 20.0: must be at least 50.0; at point 1",
     "[grid]\nworld.segment.2.strength_pa = [800.0]": "there are tables 1 to 1, not 2",
-    "[grid]\nworld.ridges.amplitude_m = [0.001]": "world.segment 1: water_percent or strength_pa is missing",
+    "[grid]\nworld.ridges.amplitude_m = [0.001]": "world.segment 1: water_percent, strength_pa or sand is missing",
     f"[grid]\n{MUD} = [800.0]\nworld.ridges.amplitude = [0.001]": "world.ridges.amplitude: there is no such key",
     f"[grid]\n{MUD} = [800.0]\nconfiguration.adaptation.methd = ['paper']": "configuration.adaptation.methd: there is",
     f"[grid]\n{MUD} = [800.0]\nconfiguration.limits.torque_nm = [99.0]": "configuration.limits.torque_nm = 99.0: must",
