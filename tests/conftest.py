@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
@@ -17,10 +17,11 @@ from tests.folders import EXAMPLE_CONFIGURATION
 from tests.recorded_walks import record_walks
 from tests.running_bench import Bench, SharedBench, running_bench
 
-# No deadline, as the machine may be busy; the same examples for each commit; `--hypothesis-profile` chooses others.
-settings.register_profile("search", deadline=None)
-settings.register_profile("long", deadline=None, max_examples=10_000)
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+# No time counts, as the machine may be busy; the same examples for each commit; `--hypothesis-profile` chooses others.
+TIMELESS = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("search", TIMELESS)
+settings.register_profile("long", TIMELESS, max_examples=10_000)
+settings.register_profile("repeatable", TIMELESS, derandomize=True)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored, and so its children
