@@ -23,6 +23,7 @@ U = TypeVar("U")
 FLIPPERS = ("left", "right")  # that a rig may have
 NEVER_S = float("-inf")
 UNKNOWN = float("nan")
+COEFFICIENTS = ("k_p", "k_s", "k_e")  # of a mud: penetration, shear, extraction
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,13 @@ from typing import Any, NamedTuple
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import mean_width_m
-from control.records import StrideEstimate
+from control.records import COEFFICIENTS, StrideEstimate
 
 BEARING, SUCTION, ADHESION = 5.14, 9.0, 0.25
 PRESSURE_AT_SURFACE, MATLOCK_J = 3.0, 0.5
 DOWN, ACROSS, UP = 0.128, 0.370, 0.054
 LARGEST_ERROR = 0.5  # of a logarithm: real grounds differ from their laws by a quarter to a third
 CLEARLY = log(2.0)  # more error of the other law: it is wrong by a further factor of two
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 UNDECIDED = "undecided"
 Reading = tuple[float, float]  # a coefficient in N/m³, and the depth below the surface in m to which it belongs
 

@@ -26,7 +26,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from control.records import FLIPPERS
+from control.records import COEFFICIENTS, FLIPPERS
 from experiments.pictures.side_view import view_from_side
 from experiments.robot.lockstep_robot import simulated_configuration
 from mudskipper.stride_walks import DaemonWalk, SimulatedWalk, Stride, Tables
@@ -56,7 +56,6 @@ PATCHES, DURATION_S = 6, 60.0
 FIRST_DEPTH_M = 0.02
 CM_PER_M, PER_JOULE, STUCK, FAULT = 100.0, 0.1, 5.0, 20.0
 LARGEST = 1000.0  # of any observation
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 Array = NDArray[np.float32]
 
 

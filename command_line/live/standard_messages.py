@@ -19,10 +19,10 @@ from rosbags.typesys import Stores, get_typestore
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.rate import RATE_HZ
-from control.records import FLIPPERS, TWO_FLIPPERS, Rig
+from control.records import COEFFICIENTS, FLIPPERS, TWO_FLIPPERS, Rig
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.rows import COEFFICIENTS, EVENT, STRIDE, TICK, TICK_KIND, rig_of
+from firmware_host.log.rows import EVENT, STRIDE, TICK, TICK_KIND, rig_of
 from operator_client.live_rows import LiveRow, LiveRows
 
 ROS = get_typestore(Stores.ROS2_HUMBLE)

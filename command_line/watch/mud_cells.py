@@ -11,9 +11,9 @@ from command_line.robot_text import OLD, at_depth, cm, is_stale
 from command_line.screen import coefficient
 from command_line.watch.bars import BARS, bars
 from command_line.watch.history import History
+from control.records import COEFFICIENTS
 from experiments.reports.text_tables import number
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 FORCES = {"forward": "force_x_n", "up": "force_z_n"}
 LEAST_FORCE_N = 2.0  # that fills the height of its curve: noise looks like noise
 TREND = 6  # strides that the trend shows

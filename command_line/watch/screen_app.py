@@ -22,7 +22,7 @@ from command_line.operation.confirmation import TORQUE_UNKNOWN
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
 from command_line.watch.joint_plots import SIGNALS, View
-from command_line.watch.mud_cells import COEFFICIENTS, coefficient_rows, force_text, stride_rows, strip_text
+from command_line.watch.mud_cells import coefficient_rows, force_text, stride_rows, strip_text
 from command_line.watch.robot_cells import (
     DRIVE_COLUMNS,
     alarm_text,
@@ -32,6 +32,7 @@ from command_line.watch.robot_cells import (
     machine_text,
     walk_text,
 )
+from control.records import COEFFICIENTS
 
 ALARM_S = 15.0
 ROOMY_ROWS = 42  # from here on the panels are apart

@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from control.geometry import FlipperGeometry
-from control.records import Phase
+from control.records import COEFFICIENTS, Phase
 from experiments.flipper.modelled_force import modelled_stride
 from experiments.reports.coefficient_table import PER_CM3
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
     GREY,

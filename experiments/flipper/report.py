@@ -9,11 +9,11 @@ from typing import Any
 
 from pandas import DataFrame
 
-from control.records import Phase
+from control.records import COEFFICIENTS, Phase
 from experiments.flipper.modelled_force import misfit_n, modelled_stride
 from experiments.flipper.plots import draw_coefficients, draw_stride
 from experiments.reports.coefficient_table import compared_frame, compared_rows, error_table, mud_summaries
-from experiments.reports.error_table import COEFFICIENTS, Row
+from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name, waters_of
 from experiments.reports.text_tables import number

@@ -11,9 +11,8 @@ import numpy as np
 import pandas
 from pandas import DataFrame
 
-from control.records import FLIPPERS
+from control.records import COEFFICIENTS, FLIPPERS
 from experiments.lablogs.estimates import DISTURBED, MISSING, RECORDED, has_error
-from experiments.reports.error_table import COEFFICIENTS
 
 CONTRADICTING = 2.0  # standard errors
 SAME_START_S = 0.2  # missing rows move the start of a stride by a few rows, and a stride takes more than a second

@@ -15,10 +15,9 @@ import numpy as np
 import pandas
 from pandas import DataFrame
 
-from control.records import Estimate, StrideEstimate
+from control.records import COEFFICIENTS, Estimate, StrideEstimate
 from estimation.estimation_parameters import Method
 from experiments.lablogs.recording import Recording, read_recording
-from experiments.reports.error_table import COEFFICIENTS
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.files.log_error import LogError
 from logs.lab.body_track import VERTICAL_AXIS

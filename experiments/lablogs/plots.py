@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from experiments.lablogs.comparisons import disturbed_values, flipper_pairs
 from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING, MISSING_ROWS, RECORDED, strokes_of
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS, name_decades
 
 COLOURS = dict(zip(COEFFICIENTS, ("tab:blue", "tab:red", "tab:green"), strict=True))

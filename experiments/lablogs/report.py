@@ -6,6 +6,7 @@ from typing import Any
 
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from experiments.lablogs.comparisons import (
     MOVED,
     agreements,
@@ -28,7 +29,6 @@ from experiments.lablogs.estimates import (
 )
 from experiments.lablogs.log_choice import group_key
 from experiments.lablogs.repeatability import first_values, repeatability, separation, walk_scatter
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.study.result import Table
 
 DEFINITIONS = (

@@ -31,7 +31,6 @@ from experiments.loadcell.strokes import (
 )
 from experiments.study.session import Show
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 LEAST_SPEED_UNCERTAINTY, LEAST_RAMP_UNCERTAINTY = 0.005, 0.1  # of a stage, from trial to trial
 SET_SPEED_UNCERTAINTY = 0.01  # of a stage's controller
 AGREEING = 3.0  # standard errors

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
+from control.records import COEFFICIENTS
+from experiments.loadcell.analysis import MudCoefficient
 from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
 from experiments.reports.mud_names import mud_text

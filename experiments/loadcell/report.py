@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from drivers.load_cell.calibration import LoadCellCalibration
 from experiments.loadcell.analysis import (
     CALLIPERS_M,
-    COEFFICIENTS,
     MudCoefficient,
     analyse,
     bench_uncertainty,

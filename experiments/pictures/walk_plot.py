@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from control.records import COEFFICIENTS
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import Floats, RecordedWalk
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
@@ -32,7 +33,6 @@ from experiments.reports.style import (
     UP,
     save_picture,
 )
-from firmware_host.log.rows import COEFFICIENTS
 
 WIDTH_IN, PANEL_IN = 10.0, 1.55
 TITLE_HEIGHT = 1.3  # above the names of the muds, in heights of a panel

@@ -16,9 +16,10 @@ from typing import Any
 
 from pandas import Categorical, DataFrame
 
+from control.records import COEFFICIENTS
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_CONSTANT_UNCERTAINTY
-from experiments.reports.error_table import COEFFICIENTS, Row, error_rows
+from experiments.reports.error_table import Row, error_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 

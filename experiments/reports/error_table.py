@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 NORMAL_95 = 1.96
 KEYS = ["setup", "mud", "coefficient", "method"]
 Row = dict[str, Any]

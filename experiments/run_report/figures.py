@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, looks_of, mark_of
 from experiments.reports.style import FAINT

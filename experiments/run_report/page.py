@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome, choose_strides, with_strides
@@ -17,7 +18,6 @@ from experiments.pictures.stride_strip import draw_strip
 from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.counted_nouns import counted
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds

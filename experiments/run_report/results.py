@@ -20,7 +20,7 @@ import numpy as np
 from pandas import DataFrame
 
 from control.faults import FAULT_KINDS, Reaction
-from control.records import UNKNOWN
+from control.records import COEFFICIENTS, UNKNOWN
 from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence, readings_of
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
@@ -28,7 +28,6 @@ from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.depth_law import fit_depth_law, law_finding
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
 from firmware_host.operator.reports import law_report

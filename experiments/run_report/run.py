@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from control.records import FLIPPERS, UNKNOWN
+from control.records import COEFFICIENTS, FLIPPERS, UNKNOWN
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from experiments.lablogs.log_choice import LABEL
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_of_trace
 from experiments.pictures.stride_choice import Stride, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_label, mud_name
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes

@@ -16,9 +16,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from estimation.estimation_parameters import EstimationParameters
 from experiments.reports.coefficient_table import compared_frame, compared_rows
-from experiments.reports.error_table import COEFFICIENTS, error_rows, plate_rows
+from experiments.reports.error_table import error_rows, plate_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.text_tables import number
 from experiments.study.option import Option, OptionError

@@ -6,7 +6,7 @@ the reference of another one. The mud is as fresh in every stride. The next stri
 remembers before it, at the depth that it reaches: its force is the coefficient times a geometry that is known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import log
 from typing import Annotated, Any
@@ -16,9 +16,11 @@ from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
 from control.controller import WalkOrder
+from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import UNKNOWN, Estimate, StrideEstimate
+from control.records import COEFFICIENTS, UNKNOWN, Estimate, StrideEstimate
 from estimation.knowledge import MudKnowledge
+from experiments.reports.error_table import NORMAL_95
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
@@ -31,9 +33,7 @@ from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 GAITS = ("walking", "measuring", "ellipse", "alternating", "backward")
-NORMAL_95 = 1.96
 LONGEST_STRIDE_S = 12.0
 
 
@@ -79,33 +79,28 @@ def walk(gait: str, strength_pa: float, seed: int, depth_m: float, strides: int)
     configuration = simulated_configuration()
     clay = Clay(f"{strength_pa:g} Pa", strength_pa)
     noisy = replace(NONE, current_noise_a=LAB.current_noise_a)
-    robot = Lockstep(
-        configuration,
-        Track([(1000.0, clay)]),
-        seed=seed,
-        disturbances=noisy,
-        fixed_base=configuration.estimation.fixed_base,
-    )
+    robot = Lockstep(configuration, Track([(1000.0, clay)]), seed=seed, disturbances=noisy)
     robot.arm()
     begun_s = robot.now_s
-    order = WalkOrder(depth_m, adaptive=False, strides=strides, gait=read_gait(gait_document(gait)))
-    robot.walk(order)
+    robot.walk(WalkOrder(depth_m, adaptive=False, strides=strides, gait=read_gait(gait_document(gait))))
     robot.run_until(lambda: robot.loop.mode is not Mode.WALKING, LONGEST_STRIDE_S * strides)
     closed = [each.estimate for each in robot.loop.learning.strides]
     speed_cm_s = 100.0 * robot.robot.plant.body_m / (robot.now_s - begun_s)
-    estimates = list(_compared(closed, clay, gait, strength_pa))
+    estimates = list(_compared(closed, clay, configuration.geometry, gait=gait, strength_pa=strength_pa))
     return {"speed_cm_s": speed_cm_s, "stuck": sum(not each.released for each in closed), "estimates": estimates}
 
 
-def _compared(closed: Sequence[StrideEstimate], clay: Clay, gait: str, strength_pa: float) -> Any:
+def _compared(
+    closed: Sequence[StrideEstimate], clay: Clay, geometry: FlipperGeometry, **keys: Any
+) -> Iterator[dict[str, Any]]:
     """Yield a row for each coefficient of each stride."""
-    knowledge, geometry = MudKnowledge(), simulated_configuration().geometry
+    knowledge = MudKnowledge()
     for stride in closed:
         remembered = knowledge.mud_estimate.of(stride.flipper)
         truths = true_coefficients(_truth_of(stride, clay), geometry, 0.0, 0.0, upright=False)
         for name in COEFFICIENTS:
             estimate, before = getattr(stride, name), getattr(remembered, name)
-            row = {"gait": gait, "strength_pa": strength_pa, "coefficient": name, "bound": estimate.at_least}
+            row = keys | {"coefficient": name, "bound": estimate.at_least}
             is_value = estimate.valid and not estimate.at_least and name in truths
             row["ratio"] = estimate.value / truths[name] if is_value else UNKNOWN
             row["normal"] = (estimate.value - truths[name]) / estimate.std_error if is_value else UNKNOWN

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from experiments.reports.error_table import COEFFICIENTS
+from control.records import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.robot.bench_errors import BenchError
 

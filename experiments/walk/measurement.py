@@ -12,8 +12,8 @@ from functools import partial
 from math import ceil
 from typing import Any
 
+from control.records import COEFFICIENTS
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,

@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pandas import DataFrame
 
-from control.records import Phase
+from control.records import COEFFICIENTS, Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES
 from experiments.study.notebook import Entry

@@ -13,6 +13,7 @@ from typing import Any
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.records import (
+    COEFFICIENTS,
     FLIPPERS,
     STANCES,
     TWO_FLIPPERS,
@@ -134,7 +135,6 @@ def rig_of(metadata: Mapping[str, str]) -> Rig:
     return Rig(tuple(flipper for flipper in FLIPPERS if flipper in named) or FLIPPERS)
 
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 COEFFICIENT_UNIT = "N/m^3"
 COEFFICIENT_PARTS = {
     "": COEFFICIENT_UNIT,

@@ -11,11 +11,10 @@ from typing import Any
 from control.fault_causes import Cause
 from control.faults import FaultKind
 from control.mud_estimate import Coefficient, MudEstimate
-from control.records import Estimate, FlipperLoad, Rig, StrideEstimate
+from control.records import COEFFICIENTS, Estimate, FlipperLoad, Rig, StrideEstimate
 from estimation.ground_law import LawEvidence
 from estimation.mud_map import Mapped, MapRow
 
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
 STRIDE_NAMES = {
     field.name: JSON_NAMES.get(field.name, field.name)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from control.modes import Mode
+from control.records import COEFFICIENTS
 from firmware_host.log.log_file import EXPORTED
-from firmware_host.log.rows import COEFFICIENTS
 from firmware_host.trial import KEYS, Trial, to_json
 from logs.catalogue.entry import FileStamp, LogEntry, MudEntry
 from logs.files.log_error import ADVICE, LogError

@@ -15,10 +15,9 @@ from command_line import exit_codes
 from command_line.operation import confirmation
 from command_line.operation.confirmation import send_order
 from command_line.watch.feed import Feed
-from command_line.watch.mud_cells import COEFFICIENTS
 from command_line.watch.screen_app import Rows, WatchApp
 from control.modes import ENERGISED, Mode
-from control.records import JOINTS
+from control.records import COEFFICIENTS, JOINTS
 from tests.command_line.watch.served_robot import ServedRobot
 from tests.waiting import LONGEST_S
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
+from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
-from experiments.reports.error_table import COEFFICIENTS
 from logs.replay import replay_files
 
 

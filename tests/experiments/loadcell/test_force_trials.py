@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
+from control.records import COEFFICIENTS
 from estimation.strokes.origin_fit import student_factor
 from experiments.loadcell.analysis import (
-    COEFFICIENTS,
     analyse,
     analyse_trial,
     gather_trials,

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student_t
 
+from control.records import COEFFICIENTS
 from experiments.reports.coefficient_table import (
     coefficient_text,
     compared_frame,
@@ -20,7 +21,6 @@ from experiments.reports.coefficient_table import (
     gather_coefficient,
     mud_table,
 )
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.bench_errors import BenchError
 from experiments.trials.coefficient_page import truth_settings
 from experiments.trials.truth_file import load_truth, truth_in

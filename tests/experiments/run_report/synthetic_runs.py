@@ -7,9 +7,9 @@ from typing import Any
 
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.stride_choice import Outcome
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.run_report.run import STRIDES, MudsFrom, Run, estimate_frame
 from logs.replay import Replay
 

@@ -9,8 +9,9 @@ from unittest.mock import patch
 import pytest
 from pandas import DataFrame
 
+from control.records import COEFFICIENTS
 from experiments.reports.coefficient_table import compared_frame, compared_rows
-from experiments.reports.error_table import COEFFICIENTS, error_rows
+from experiments.reports.error_table import error_rows
 from experiments.studies import estimation
 from experiments.studies.estimation import (
     LATENCY,

@@ -3,7 +3,8 @@
 import pytest
 from pandas import DataFrame
 
-from experiments.studies.paths import COEFFICIENTS, walk
+from control.records import COEFFICIENTS
+from experiments.studies.paths import walk
 
 
 @pytest.mark.parametrize("gait", ["ellipse", "backward"])

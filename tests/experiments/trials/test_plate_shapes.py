@@ -12,9 +12,9 @@ from statistics import median
 import pytest
 
 from control.geometry import FlipperGeometry
+from control.records import COEFFICIENTS
 from estimation.estimation_parameters import EstimationParameters
 from experiments.campaign.plate_file import read_corners
-from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.trial import SINGLE, run_trial
 from simulation.mud.clay import clay_of_water

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from experiments.reports.error_table import COEFFICIENTS
+from control.records import COEFFICIENTS
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.studies.walk import walking_bench
 from experiments.study.notebook import Entry, Notebook
