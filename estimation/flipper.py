@@ -335,7 +335,7 @@ def _across_nm(geometry: FlipperGeometry, batch: Batch) -> float:
 
 
 def _widened(estimate: Estimate, uncertainty: float) -> Estimate:
-    """Add a relative uncertainty that the strokes of a path share."""
+    """Add a relative uncertainty that the strokes of a path have in common."""
     return estimate._replace(std_error=hypot(estimate.std_error, uncertainty * estimate.value))
 
 

@@ -1,6 +1,6 @@
 """Which law the ground under the flippers follows: that of soft mud or that of dry sand.
 
-Each law says how the three coefficients of one ground compare, whatever its strength. A plate of width w and
+Each law says how the three coefficients of one ground compare, at any strength. A plate of width w and
 thickness t at the depth z has, per unit of strength,
 
     mud     k_p = (N_c t w + 2 a (w + t) z) / t w z    k_s = 6/z + J/w           k_e = (9 t w + 2 a (w + t) z) / t w z
@@ -73,7 +73,7 @@ def law_evidence(geometry: FlipperGeometry, readings: Mapping[str, Reading]) -> 
 def readings_of(measured: Iterable[tuple[str, Any]]) -> dict[str, Reading]:
     """Return the medians of the strides' coefficients, which are estimates or rows of a table with the same names.
 
-    A k_e that is too small to be told from nothing, as in sand, counts with its error, as the most that it may be.
+    A k_e that is too small to differ from zero, as in sand, counts with its error, as the most that it may be.
     """
     values: dict[str, list[Reading]] = {name: [] for name in COEFFICIENTS}
     faint: list[Reading] = []

@@ -85,7 +85,7 @@ class MudWalk(gymnasium.Env[Array, Array]):
         if socket is not None and (backend != "daemon" or world is not None):
             raise ValueError(f"socket = {str(socket)!r}: needs backend = 'daemon', and a robot there has its own world")
         if (socket is not None) is not operated:
-            raise ValueError(f"operated = {operated}: must be True for a robot behind a socket, with an operator by it")
+            raise ValueError(f"operated = {operated}: must be True with a socket, and an operator by the robot")
         self.render_mode = render_mode
         self.action_space = Box(-1.0, 1.0, (len(ACTION),), np.float32)
         self.observation_space = Box(-LARGEST, LARGEST, (len(OBSERVATION),), np.float32)

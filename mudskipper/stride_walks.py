@@ -1,4 +1,4 @@
-"""Walks of which each stride is ordered: of a robot simulated in this process, and of one behind a daemon's socket.
+"""Walks of which each stride is ordered: of a robot simulated in this process, and of one that a daemon runs.
 
 Both report a stride with the same keys and units: those of the socket's `strides`, and its advance, time and energy.
 """

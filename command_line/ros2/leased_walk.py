@@ -1,7 +1,7 @@
 """Walks for as long as a ROS 2 client calls: `walk` is a dead-man, which `ros2 service call --rate 2` holds.
 
 The first call begins a walk under the lease of the daemon, and each one renews it. A client that ends, hangs or loses
-its network lets the lease run out, and the daemon stops the robot. Whatever else ends the walk or takes the lease (an
+its network lets the lease run out, and the daemon stops the robot. Any other end of the walk or of the lease (by an
 operator, a fault, `stop`) is final until the client has paused: its repeated calls must not start the robot again.
 """
 

@@ -69,7 +69,7 @@ class RosPublisher:
 
     @property
     def is_wanted(self) -> bool:
-        """Return whether somebody has subscribed."""
+        """Return whether there is a subscriber."""
         status: Any = self._publisher.matching_status  # its stub says bool
         return bool(status.matching)
 

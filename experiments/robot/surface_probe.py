@@ -4,9 +4,11 @@ Each flipper goes down slowly, at several sweeps, until its force has risen and 
 print, so no two are at one position. The surface of each is found from force over depth as that of an insertion is
 (estimation/strokes/surface.py), but only 2 to 5 mm deep: what the law of the force shifts it by is 0.2 to 0.6 mm. Mud
 falls off the plate as it goes down, so the force in the air is a line, which is subtracted. Mud is met by the deepest
-corner of a plate that leans, and bears fully once the edge has sunk by a tenth of its thickness, as footings do.
+corner of a plate that leans, and withstands its full load once the edge has sunk by a tenth of its thickness, as under
+footings.
 
-The touches scatter by s, from their own errors and the unevenness of the mud, and share an error ε of law and sinking.
+The touches scatter by s, from their own errors and the unevenness of the mud; all have the same error ε of law and
+sinking.
 So the mean of n touches has the error √(s²/n + ε²), and the mud at one stride lies √(s² + s²/n + ε²) from this mean.
 """
 

@@ -46,7 +46,7 @@ def study(
     strides: Annotated[int, Option("of a walk", low=3, high=200)] = 8,
     seeds: Annotated[int, Option("walks in each mud", low=1, high=100)] = 3,
 ) -> Result:
-    """What paths other than the crutching gait tell about a mud."""
+    """The coefficients of a mud from paths other than the crutching gait."""
     for name in gait:
         read_gait(gait_document(name))  # refused before anything runs
     walked = {"depth_m": depth / 100.0, "strides": strides}
