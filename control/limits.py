@@ -76,7 +76,7 @@ def apply_limits(
     """Limit the wanted torques. If one torque, angle or velocity is not finite, all torques are zero."""
     torques_nm = [
         limited_torque_nm(wanted, previous, state, limits, span, dt_s)
-        if isfinite(wanted) and isfinite(state.angle_rad) and isfinite(state.velocity_rad_s)
+        if isfinite(wanted + state.angle_rad + state.velocity_rad_s)
         else float("nan")
         for wanted, previous, state, span in zip(wanted_nm, previous_nm, states, ranges, strict=True)
     ]

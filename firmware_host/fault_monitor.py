@@ -28,6 +28,7 @@ from control.records import (
 from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
+from firmware_host.bus_monitor import BusMonitor
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LogMonitor, LoopMonitor
@@ -38,8 +39,6 @@ PUNCTUAL_FRACTION = 0.5  # of a period: a tick that is later gives its torque a 
 STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
 CUT_S = 0.1  # of the silence of all drives, which began within this time: the motors' power is cut
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
-REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command
-BUS_TROUBLE_S = 2.0  # how long a bus warning outlasts the last error frame
 POSE_FORGOTTEN_S = 10.0  # a pose source that is silent for longer counts as switched off on purpose
 BROKEN = frozenset(
     {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
@@ -48,11 +47,6 @@ CATCH_UP_S = 0.3  # a sweep that the mud held at the far end of a stance needs 0
 IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY, Phase.STROKE})
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
-BUS_FAULTS = {
-    BusState.WARNING: FaultKind.BUS_WARNING,
-    BusState.PASSIVE: FaultKind.BUS_PASSIVE,
-    BusState.OFF: FaultKind.BUS_OFF,
-}
 
 
 class MonitorInput(NamedTuple):
@@ -93,11 +87,7 @@ class FaultMonitor:
         self._uncalibrated = [FaultKind.UNCALIBRATED.fault(joints=uncalibrated)] if uncalibrated else []
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
-        self._failed_sends = {name: port.failed_sends for name, port in drives.ports.items()}
-        self._bus_events = {name: (0, BusState.ACTIVE) for name in drives.ports}
-        self._error_s = dict.fromkeys(drives.ports, NEVER_S)
-        self._lost_frames = {name: port.lost_frames for name, port in drives.ports.items()}
-        self._refused_ticks = dict.fromkeys(drives.ports, 0)
+        self._buses = [BusMonitor(name, port) for name, port in drives.ports.items()]
         self._restarts = {health.joint: health.restarts for health in drives.health}
         self._foreign_commands = {health.joint: health.foreign_commands for health in drives.health}
         self._refused_commands = drives.refused_commands
@@ -129,7 +119,8 @@ class FaultMonitor:
         """Return all faults of this tick."""
         found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
         found += self._log.update(monitor_input.log)
-        self._check_buses(found, tick.now_s)
+        for bus in self._buses:
+            bus.update(found, tick.now_s)
         self.power_cut = monitor_input.power_cut
         if self.power_cut:
             found.append(FaultKind.POWER_CUT.fault(reason=self.power_cut))
@@ -156,24 +147,6 @@ class FaultMonitor:
         found += self._uncalibrated
         self._check_pose(found, tick.now_s, monitor_input.body)
         return found
-
-    def _check_buses(self, found: list[Fault], now_s: float) -> None:
-        """A warning ends with the error frames: not every CAN driver reports that its controller has recovered."""
-        for name, port in self._drives.ports.items():
-            state, lost_frames, failed_sends = port.state, port.lost_frames, port.failed_sends
-            events = (port.error_frames, state)
-            if events != self._bus_events[name]:
-                self._bus_events[name], self._error_s[name] = events, now_s
-            if state is BusState.OFF or (state and now_s - self._error_s[name] < BUS_TROUBLE_S):
-                found.append(BUS_FAULTS[state].fault(name, reason=port.last_error or "the reason is unknown"))
-            if lost_frames != self._lost_frames[name]:
-                found.append(FaultKind.FRAMES_LOST.fault(name, frames=lost_frames - self._lost_frames[name]))
-                self._lost_frames[name] = lost_frames
-            refused = failed_sends > self._failed_sends[name]
-            self._failed_sends[name] = failed_sends
-            self._refused_ticks[name] = ticks = self._refused_ticks[name] + 1 if refused else 0
-            if ticks >= REFUSED_TICKS:
-                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=port.last_send_error))
 
     def _check_power(self, found: list[Fault], drives: Joints[DriveHealth]) -> None:
         """Find a cut of the motors' power: a drive reports it, or all drives of all buses fall silent at once."""

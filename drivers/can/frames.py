@@ -20,9 +20,7 @@ STANDARD_MASK, EXTENDED_MASK = 0x7FF, 0x1FFFFFFF
 DATA_MAX_BYTES = 8  # of CAN 2.0
 FD_LENGTHS = frozenset({*range(9), 12, 16, 20, 24, 32, 48, 64})  # the only ones that CAN FD can express
 
-
-class MalformedMessageError(ValueError):
-    """A payload has the wrong length, or contains something that its protocol does not have."""
+MalformedMessageError = struct.error  # a payload of another length, or with something that its protocol does not have
 
 
 class Frame(NamedTuple):

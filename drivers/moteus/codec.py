@@ -12,7 +12,7 @@ position. All registers that a torque command does not write are at their defaul
 
 from enum import IntEnum
 from math import nan
-from struct import Struct, error
+from struct import Struct
 from typing import NamedTuple
 
 from drivers.can.frames import Frame, MalformedMessageError
@@ -173,12 +173,7 @@ def encode_reply(reply: Reply) -> bytes:
 
 def decode_reply(data: bytes) -> Reply:
     """Decode a reply; raises MalformedMessageError for a payload that does not answer QUERY."""
-    try:
-        a, mode, b, position, velocity, c, current, d, motor, e, voltage, board, fault, f, torque, g = _REPLY.unpack(
-            data
-        )
-    except error as problem:
-        raise MalformedMessageError(f"a reply of {len(data)} bytes") from problem
+    a, mode, b, position, velocity, c, current, d, motor, e, voltage, board, fault, f, torque, g = _REPLY.unpack(data)
     if (a, b, c, d, e, f, g) != _REPLY_HEADS:
         raise MalformedMessageError("a reply of other registers")
     return Reply(  # by position: it is built for every drive in every tick

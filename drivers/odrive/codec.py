@@ -8,7 +8,7 @@ program reads a drive's version before it arms it.
 
 from collections.abc import Mapping
 from enum import IntEnum
-from struct import Struct, error
+from struct import Struct
 from typing import Any
 
 from drivers.can.frames import DATA_MAX_BYTES, MalformedMessageError
@@ -20,20 +20,12 @@ class Message:
     def __init__(self, command: int, layout: str) -> None:
         self.command = command
         self._struct = Struct(layout)
-
-    def encode(self, *values: Any) -> bytes:
-        return self._struct.pack(*values)
+        self.encode = self._struct.pack
+        self.decode = self._struct.unpack  # raises MalformedMessageError for a shorter or longer payload
 
     def decode_padded(self, data: bytes) -> tuple[Any, ...]:
         """Return the values of a payload with any bytes after them, as a drive reads commands: the makers' DBC pads."""
         return self.decode(data[: self._struct.size])
-
-    def decode(self, data: bytes) -> tuple[Any, ...]:
-        """Return the values; raises MalformedMessageError for a payload that is shorter or longer than the layout."""
-        try:
-            return self._struct.unpack(data)
-        except error as problem:
-            raise MalformedMessageError(f"command 0x{self.command:02x} with {len(data)} bytes") from problem
 
 
 GET_VERSION = Message(0x00, "<8B")  # protocol, product line, hw version, hw variant, major, minor, revision, unreleased

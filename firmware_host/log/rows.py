@@ -98,9 +98,9 @@ def tick_row(
 ) -> bytes:
     """Pack the values of one tick, in the order of the table above."""
     now_s = tick.now_s
-    columns = tuple(zip(*states, strict=True))
-    angles_rad, velocities_rad_s, angle_stamps_s, currents_a, current_stamps_s = columns[:5]
-    temperatures_c, _, voltages_v, _, supply_currents_a = columns[8:]
+    columns = zip(*states, strict=True)
+    angles_rad, velocities_rad_s, angle_stamps_s, currents_a, current_stamps_s, _, _, _, *slow = columns
+    temperatures_c, _, voltages_v, _, supply_currents_a = slow
     return kind.layout.pack(
         CDR_HEADER,
         now_s,

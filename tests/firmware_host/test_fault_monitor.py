@@ -17,12 +17,11 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
+from firmware_host.bus_monitor import REFUSED_TICKS, TROUBLE_S
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import (
     ARMING_S,
-    BUS_TROUBLE_S,
     POSE_FORGOTTEN_S,
-    REFUSED_TICKS,
     FaultMonitor,
     MonitorInput,
 )
@@ -284,7 +283,7 @@ def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: B
 @pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
 def test_bus_warnings_end_without_error_frames_but_bus_off_stays(bench: Bench, state: BusState) -> None:
     bench.ports["left"].state = state
-    for _ in range(int(BUS_TROUBLE_S / PERIOD_S) - 1):
+    for _ in range(int(TROUBLE_S / PERIOD_S) - 1):
         assert bench.tick()
     bench.tick()
     assert bench.tick() == []

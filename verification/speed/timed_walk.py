@@ -50,7 +50,7 @@ STAGES = {  # in their order, by the loop's method that begins each
 
 
 class CountedPort:
-    """Passes everything on to a port, and counts its frames."""
+    """Passes everything on to the robot's port, outside of the ticks, and counts its frames."""
 
     def __init__(self, port: CanPort) -> None:
         self._port = port
@@ -72,7 +72,7 @@ class CountedPort:
 class OpenedBus:
     """A bus whose two ends are open already: the robot's and the loop's."""
 
-    def __init__(self, robot: CanPort, loop: CountedPort) -> None:
+    def __init__(self, robot: CountedPort, loop: CanPort) -> None:
         self._ends = [loop, robot]
 
     def open(self) -> Any:
@@ -117,17 +117,17 @@ class TimedWalk:
 
     def __init__(self, configuration: Configuration, wiring: dict[str, PortPair], recorder: Recorder) -> None:
         self.recorder = recorder
-        loop_ports = {name: CountedPort(loop) for name, (_, loop) in wiring.items()}
-        buses = {name: OpenedBus(robot, loop_ports[name]) for name, (robot, _) in wiring.items()}
+        robot_ports = {name: CountedPort(robot) for name, (robot, _) in wiring.items()}
+        buses = {name: OpenedBus(robot_ports[name], loop) for name, (_, loop) in wiring.items()}
         self.walk = Lockstep(configuration, paper_track(), recorder=recorder, buses=buses)
         self._warm_up()
-        before = [(port.received, port.sent) for port in loop_ports.values()]
+        before = [(port.received, port.sent) for port in robot_ports.values()]
         for _ in range(BLOCK_TICKS):
             self._tick()
         self.bare = BareSockets(
             [
-                ((port.received - received) / BLOCK_TICKS, (port.sent - sent) / BLOCK_TICKS)
-                for port, (received, sent) in zip(loop_ports.values(), before, strict=True)
+                ((port.sent - sent) / BLOCK_TICKS, (port.received - received) / BLOCK_TICKS)
+                for port, (received, sent) in zip(robot_ports.values(), before, strict=True)
             ]
         )
         self.durations_s: dict[str, list[float]] = {name: [] for name in ("whole", "longest", "cold", "bare_sockets")}

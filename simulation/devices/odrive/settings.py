@@ -6,7 +6,6 @@ was written by the message that also answers a question.
 """
 
 from dataclasses import replace
-from struct import error
 
 from drivers.can.frames import MalformedMessageError
 from drivers.odrive import codec
@@ -59,7 +58,7 @@ class OdriveSettings:
             if opcode == SDO_WRITE:
                 (value,) = layout.unpack_from(data, codec.SDO_HEAD_BYTES)
                 parameters = self._write(key, float(value), parameters)
-        except (MalformedMessageError, KeyError, error):
+        except (MalformedMessageError, KeyError):
             return b"", parameters
         value = self._value(key, parameters)
         number = value if TYPES[key] == "float" else round(value)
