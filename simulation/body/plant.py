@@ -4,10 +4,10 @@ Arms have a constant inertia about each joint, the gravity of a level body, and 
 with the body's, so their acceleration does not move the body. Viscous friction grows with speed. Coulomb friction, off
 at 0, opposes a turning joint with a constant torque and holds a resting one against less than that. It is solved for
 the velocity at the end of a step, which it brings to zero but never reverses, so a joint sticks and steps of any length
-are stable. Each arm has its own history of earlier strokes, whose effects are off by default. The sources write
-`lift_nm` for the torque that raises the adduction joint. The integrator is semi-implicit
-Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm
-swing at about 400 rad/s.
+are stable. Belts with play, off at 0, let each motor turn apart from its joint (belt.py). Each arm has its own history
+of earlier strokes, whose effects are off by default. The sources write `lift_nm` for the torque that raises the
+adduction joint. The integrator is semi-implicit Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in
+the stiffest of the paper's muds, makes the arm swing at about 400 rad/s.
 """
 
 from itertools import chain
@@ -16,6 +16,7 @@ from operator import add
 from random import Random
 
 from control.records import JointAngles, Joints, Torques
+from simulation.body.belt import Belt
 from simulation.body.bench_mount import BenchMount
 from simulation.body.free_body import FreeBody
 from simulation.body.plant_parameters import PlantParameters
@@ -48,6 +49,9 @@ class Arm:
         self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
         self.mount: BenchMount | None = None  # over the edge of a bench, in place of the mud
+        play_rad, mass = radians(parameters.disturbances.play_deg), parameters.arm_mass
+        inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2) if play_rad else ()
+        self.belts = tuple(Belt(play_rad, inertia_kg_m2) for inertia_kg_m2 in inertias_kg_m2)
         self.reset()
 
     def reset(self) -> None:
@@ -70,6 +74,16 @@ class Arm:
         self.contact.reset()
         if self.stones:
             self.stones.reset()
+        for belt, angle_rad in zip(self.belts, (self.sweep_rad, self.adduction_rad), strict=False):
+            belt.put(angle_rad)
+
+    @property
+    def motors(self) -> tuple[float, float, float, float]:
+        """The angle and the velocity of the (sweep, adduction) motors, which their encoders measure."""
+        if self.belts:
+            sweep, adduction = self.belts
+            return sweep.angle_rad, sweep.velocity_rad_s, adduction.angle_rad, adduction.velocity_rad_s
+        return self.sweep_rad, self.sweep_velocity_rad_s, self.adduction_rad, self.adduction_velocity_rad_s
 
     @property
     def surface_m(self) -> float:
@@ -86,6 +100,8 @@ class Arm:
         carriage: Carriage | None = None,
     ) -> None:
         """`carriage`: how a free body carries this arm."""
+        if self.belts:
+            sweep_nm, lift_nm = self._transmit(dt_s, sweep_nm, lift_nm)
         if self.mount:
             self._step_on_bench(self.mount, dt_s, sweep_nm, lift_nm)
             return
@@ -108,6 +124,14 @@ class Arm:
             lift_nm + load_lift_nm,
             mass.sweep_inertia_kg_m2,
             mass.adduction_inertia_kg_m2,
+        )
+
+    def _transmit(self, dt_s: float, sweep_nm: float, lift_nm: float) -> tuple[float, float]:
+        """Turn the motors for a step; return the torques of their belts on the arm."""
+        sweep, lift = self.belts
+        return (
+            sweep.transmit(dt_s, sweep_nm, self.sweep_rad, self.sweep_velocity_rad_s),
+            lift.transmit(dt_s, lift_nm, self.adduction_rad, self.adduction_velocity_rad_s),
         )
 
     def _step_on_bench(self, mount: BenchMount, dt_s: float, sweep_nm: float, lift_nm: float) -> None:
@@ -151,6 +175,9 @@ class Arm:
     def _move(
         self, dt_s: float, sweep_nm: float, lift_nm: float, sweep_inertia_kg_m2: float, lift_inertia_kg_m2: float
     ) -> None:
+        if self.belts:  # which turn the rotors
+            sweep_inertia_kg_m2 -= self.belts[0].rotor_kg_m2
+            lift_inertia_kg_m2 -= self.belts[1].rotor_kg_m2
         coulomb_nm, disturbances = self.parameters.joint_coulomb_nm, self.parameters.disturbances
         sweep_dry_nm = coulomb_nm + disturbances.sweep_friction_nm
         lift_dry_nm = coulomb_nm + disturbances.adduction_friction_nm

@@ -105,9 +105,10 @@ class SimulatedRobot:
                 port.send(foreign)
 
     def _measure(self) -> None:
-        """Give each drive its joint's true motion; without records in between, as this runs in every step."""
+        """Give each drive its motor's true motion; without records in between, as this runs in every step."""
         drives, joint = self.drives, 0
         for arm in self.plant.arms:
-            drives[joint].measure(arm.sweep_rad, arm.sweep_velocity_rad_s)
-            drives[joint + 1].measure(arm.adduction_rad, arm.adduction_velocity_rad_s)
+            sweep_rad, sweep_rad_s, adduction_rad, adduction_rad_s = arm.motors
+            drives[joint].measure(sweep_rad, sweep_rad_s)
+            drives[joint + 1].measure(adduction_rad, adduction_rad_s)
             joint += 2

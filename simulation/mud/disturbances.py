@@ -21,6 +21,7 @@ Measured in the authors' raw logs, where not stated otherwise:
                  both in June and August. It adds to the plant's own. An estimator has to withstand the larger one,
                  which is that of LAB. TRACKWAY has the smaller one: with the larger one no mud has the speeds of
                  Table I (docs/explanation/depth.md)
+    play         of belts between motor and joint (simulation/body/belt.py); the authors' robots have none
     drives       current noise of 0.1 to 0.3 A; 50 to 210 distinct states a second; a clip of the current
 
 Infrequent messages disturb more than the estimator here, where the joints' loop is closed over the bus: with the
@@ -61,6 +62,7 @@ class Disturbances:
     trial_surface_sd_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0
     sweep_friction_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
     adduction_friction_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
+    play_deg: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the belts between motors and joints
 
     @property
     def surface_error_m(self) -> float:

@@ -1,12 +1,13 @@
 """Hours of simulated walking in which nothing fails: a fault that stops the robot is a false alarm.
 
 Each walk has its own mud, drawn between soft and firm with random strength along the track, the disturbances of the
-authors' logs or none, a body that is free or on rails, and adaptive or fixed depths. The robot walks, holds, moves
-joints and walks on, in lockstep. A flipper that the mud holds is no false alarm: those faults are counted apart, as is
-a free body that sinks until the mud blocks the swing of its flippers.
+authors' logs or none, direct motors or belts with play, a body that is free or on rails, and adaptive or fixed depths.
+The robot walks, holds, moves joints and walks on, in lockstep. A flipper that the mud holds is no false alarm: those
+faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers.
 """
 
 from collections import Counter
+from dataclasses import replace
 from random import Random
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ from pandas import DataFrame
 from control.controller import WalkOrder
 from control.faults import Reaction
 from control.modes import Mode, Request
+from control.parameters.joint_gains import JointGains
 from drivers.drive_types import DEFAULT
 from experiments.study.option import Option
 from experiments.study.result import Result, Table
@@ -32,6 +34,8 @@ from verification.faults.phases import real_configuration
 WALK_S = 60.0
 STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it
 DEPTHS_M = (0.02, 0.025, 0.03, 0.035)
+PLAY_DEG = 1.0  # of belts between motors and joints
+GAINS_WITH_PLAY = JointGains(4.0, 0.033, 4.0, 0.033)  # of asked drives: 8 degrees of phase margin for a rotor alone
 MOVE_RAD = 0.2
 BY_THE_MUD, BY_SINKING = ("flipper_stuck", "joint_not_following"), "following_error"
 
@@ -68,8 +72,10 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     chance, configuration = Random(f"healthy {seed}"), real_configuration(drive)
     strength = RandomStrength(chance.choice((0.0, 0.1, 0.25)), chance.uniform(0.05, 0.5), seed)
     track = Track([(100.0, Clay("drawn", chance.uniform(*STRENGTHS_PA)))], random_strength=strength)
-    disturbances = chance.choice((NONE, LAB))
+    disturbances = replace(chance.choice((NONE, LAB)), play_deg=chance.choice((0.0, PLAY_DEG)))
     is_free = chance.random() < 0.5
+    if disturbances.play_deg and any(each.answers_only for each in configuration.drive.values()):
+        configuration = replace(configuration, gains=GAINS_WITH_PLAY)
     plant = plant_of(configuration, disturbances, free_body=is_free)
     drives = drives_of(configuration, **drive_changes(disturbances))
     robot = FailingRobot(configuration, track, seed, plant=plant, drives=drives)
@@ -86,6 +92,7 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     held, alarms = [text for text, by_mud in named if by_mud], [text for text, by_mud in named if not by_mud]
     return {
         "duration_s": robot.now_s,
+        "play_deg": disturbances.play_deg,
         "strides": strides,
         "distance_m": robot.robot.plant.body_m,
         "alarms": [] if held else alarms,
