@@ -15,6 +15,7 @@ from control.monitors.encoder_monitor import YIELDING_NM
 from control.records import JOINTS, NEVER_S, Torques
 from drivers.drive_types import type_of
 from drivers.fault_injection.failures import MOST_DELAY_S
+from firmware_host.fault_monitor import IN_MUD
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.joint_energy import AT_STOP_RAD
 from tests.dst.operated_robot import OperatedRobot
@@ -217,7 +218,8 @@ class TrueTorque(Promise):
 
     What a right motor would have done with the same commands is its command's work along the true path. The rest is
     bounded for each time that torque is on, and so is the time for which the true torque exceeds what any command of a
-    right motor may be: a stride, in which every joint moves through air once.
+    right motor may be: a stride, in which every joint moves through air once. In mud, whose resistance is unknown, no
+    torque constant shows: there the time alone is bounded.
     """
 
     STRONG = 2.0
@@ -236,10 +238,12 @@ class TrueTorque(Promise):
         if max(self.reach.gains) < self.STRONG:
             return
         velocities_rad_s = self.mechanics.plant.velocities_rad_s
+        in_mud = self.loop.controller.target.phase in IN_MUD
         for index, (torque_nm, gain) in enumerate(zip(torques_nm, self.reach.gains, strict=True)):
             if gain < self.STRONG or self.reach.is_foreign(index):
                 continue
-            self._excess_j[index] += (1.0 - 1.0 / gain) * torque_nm * velocities_rad_s[index] * dt_s
+            if not in_mud:
+                self._excess_j[index] += (1.0 - 1.0 / gain) * torque_nm * velocities_rad_s[index] * dt_s
             self._lowest_j[index] = min(self._lowest_j[index], self._excess_j[index])
             self._beyond_s[index] += dt_s if abs(torque_nm) > self._limit_nm else 0.0
 
@@ -259,7 +263,7 @@ class WithinStops(Promise):
     """No motor presses its joint against the mechanical stop, by its true torque and the joint's true angle.
 
     An encoder that freezes at zero speed shows only in a torque that changes by more than YIELDING_NM: until then the
-    robot cannot distinguish it from a joint that mud holds, and less torque than that may press the joint.
+    robot cannot distinguish it from a joint that mud holds, and the torque at that time may press the joint.
     """
 
     PRESSING_NM = 0.3
@@ -269,6 +273,7 @@ class WithinStops(Promise):
     def begin(self) -> None:
         self._pressed_s = [0.0] * len(JOINTS)
         self._free_s = [0.0] * len(JOINTS)
+        self._frozen_nm: dict[int, tuple[float, float]] = {}  # lowest and highest torque since the encoder froze
 
     def measure(self, dt_s: float, torques_nm: Torques) -> None:
         if max(torques_nm) < self.PRESSING_NM and min(torques_nm) > -self.PRESSING_NM and not any(self._pressed_s):
@@ -290,8 +295,14 @@ class WithinStops(Promise):
                 yield f"{joint} is pressed against its stop for {pressed_s:.2f} s"
 
     def _is_hidden(self, index: int) -> bool:
-        is_frozen = self.mechanics.drives[index].parameters.encoder_frozen
-        return is_frozen and abs(self.loop.sent.torques_nm[index]) < YIELDING_NM
+        if not self.mechanics.drives[index].parameters.encoder_frozen:
+            self._frozen_nm.pop(index, None)
+            return False
+        torque_nm = self.loop.sent.torques_nm[index]
+        lowest_nm, highest_nm = self._frozen_nm.get(index, (torque_nm, torque_nm))
+        lowest_nm, highest_nm = min(lowest_nm, torque_nm), max(highest_nm, torque_nm)
+        self._frozen_nm[index] = lowest_nm, highest_nm
+        return abs(torque_nm) < YIELDING_NM or highest_nm - lowest_nm <= YIELDING_NM
 
 
 class EnergyRise:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tests.dst.scenario import Call, Failure, Scenario, Surroundings, Suspend, Terminate
+from tests.dst.scenario import Call, Drift, Failure, Scenario, Surroundings, Suspend, Terminate
 
 
 class Regression(NamedTuple):
@@ -253,6 +253,56 @@ REGRESSIONS = (
                 Failure(at_s=0.269, component="loop", kind="stuck", for_s=0.013),
             ),
             for_s=0.344,
+        ),
+    ),
+    Regression(
+        "what a strong motor does in a stance, where no torque constant shows, was bounded like its work in air",
+        Scenario(
+            seed=7330569,
+            surroundings=Surroundings(
+                seed=458160,
+                strength_pa=3967,
+                depth_m=0.017,
+                disturbed=True,
+                drives=(("current_lag_s", 0.001), ("message_delay_s", 0.0005)),
+                configuration=(
+                    ("motion.path_speed_rad_s", 1.6),
+                    ("motion.fade_in_s", 0.3),
+                    ("gait.swing_duration_s", 0.6),
+                    ("gains.sweep_stiffness_nm_rad", 7.4),
+                    ("gains.adduction_stiffness_nm_rad", 11.0),
+                ),
+            ),
+            start="hold",
+            events=(
+                Call(at_s=0.0, client="pilot", method="walk"),
+                Drift(at_s=0.316, joint="left_sweep", values={"torque_constant_error": 2.542}, for_s=0.896, over_s=0.1),
+            ),
+            for_s=1.05,
+        ),
+    ),
+    Regression(
+        "an encoder that freezes at zero speed and full torque was expected to be detected before the torque changes",
+        Scenario(
+            seed=7330708,
+            surroundings=Surroundings(
+                seed=458169,
+                strength_pa=3579,
+                depth_m=0.017,
+                drive_type="moteus",
+                drives=(("cogging_nm", 0.003), ("message_delay_s", 0.0005)),
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.7),
+                    ("motion.fade_in_s", 0.1),
+                    ("gait.swing_duration_s", 0.8),
+                ),
+            ),
+            start="stance",
+            events=(
+                Call(at_s=0.0, client="pilot", method="walk"),
+                Failure(at_s=0.105, component="left_sweep.encoder", kind="frozen", for_s=3.776),
+            ),
+            for_s=0.9,
         ),
     ),
 )
