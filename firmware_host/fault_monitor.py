@@ -3,7 +3,7 @@
 It only detects. The latch decides how long a fault is present, and the modes decide how the robot reacts.
 """
 
-from math import isnan
+from math import copysign, isnan
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -12,6 +12,7 @@ from control.joint_friction import NO_FRICTION
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
+from control.monitors.motion_monitor import PROBE_NM
 from control.monitors.torque_gain_monitor import FlipperStrokes, TorqueGainMonitor
 from control.monitors.zero_monitor import ZeroMonitor
 from control.rate import PERIOD_S
@@ -23,6 +24,7 @@ from control.records import (
     JointTarget,
     JointTargets,
     Phase,
+    Torques,
     same_for_all,
 )
 from drivers.can.port_health import BusState
@@ -115,6 +117,21 @@ class FaultMonitor:
             )
         )
 
+    def with_probes(self, wanted: Torques, largest_nm: float) -> Torques:
+        """Return the wanted torques; of a joint that is probed less, also than the largest one."""
+        for joint in self.joints:
+            if joint.motion.probed:
+                break
+        else:
+            return wanted
+        less_nm = [PROBE_NM if joint.motion.probed else 0.0 for joint in self.joints]
+        return Joints(
+            *(
+                copysign(max(min(abs(torque_nm), largest_nm) - nm, 0.0), torque_nm) if nm else torque_nm
+                for nm, torque_nm in zip(less_nm, wanted, strict=True)
+            )
+        )
+
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         """Return all faults of this tick."""
         found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
@@ -196,7 +213,6 @@ class FaultMonitor:
             moving=mode in MOVING,
             may_stand_still=monitor_input.freeing or mode not in HELD,
             damping=mode is Mode.DAMPING,
-            held=mode is Mode.HOLD,
         )
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:

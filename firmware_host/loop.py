@@ -216,6 +216,7 @@ class Loop:
             return self.nothing_sent
         present, limits = self.controller.present or self.states, self.configuration.limits
         states = self.fault_monitor.with_winding_heat(present)
+        wanted = self.fault_monitor.with_probes(wanted, limits.torque_nm)
         return apply_limits(wanted, self.sent.torques_nm, states, limits, self._joint_ranges, self.period_s)
 
     def _command(self, now_s: float) -> None:

@@ -45,7 +45,6 @@ class TickFacts(NamedTuple):
     moving: bool  # closed loop is expected of the drives
     may_stand_still: bool  # at any torque: without stiffness, or in a recovery that pulls on purpose
     damping: bool = False
-    held: bool = False  # the mode is HOLD
 
 
 class JointMonitor:
@@ -73,7 +72,7 @@ class JointMonitor:
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
         self._encoder = EncoderMonitor(joint, bounds.jump_rad)
-        self._motion = MotionMonitor(joint, dynamics, limits.torque_nm)
+        self.motion = MotionMonitor(joint, dynamics, limits.torque_nm)
         self._stillness = Stillness(STILL_RAD)
         self._most_a = CURRENT_FRACTION * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
@@ -90,7 +89,7 @@ class JointMonitor:
         self._low_s = self._under_s = self._hot_s = 0.0
         self._unasked_s, self._answer_stamp_s = 0.0, NEVER_S
         self._encoder.reset()
-        self._motion.reset()
+        self.motion.reset()
         self._stillness.reset()
 
     def update(
@@ -221,9 +220,9 @@ class JointMonitor:
         if encoder_fault:
             found.append(encoder_fault)
         if encoder_fault or not facts.moving:
-            self._motion.reset()
+            self.motion.reset()
         else:
-            self._motion.update(found, state, seen_s, torque_nm, target, facts.held)
+            self.motion.update(found, state, seen_s, torque_nm, target, facts.damping)
 
     def _out_of_range(self, angle_rad: float, low_rad: float, high_rad: float) -> Fault:
         low_deg, high_deg = degrees(low_rad), degrees(high_rad)

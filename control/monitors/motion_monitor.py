@@ -16,11 +16,12 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  in air only.
     driven back  the path against a torque, where the target does not lead, in intervals in a row. Mud, friction and
                  stops yield to a torque or resist it, and a load that outweighs it moves the joint until both are
-                 equal. A target that moves against a torque near the limit does not lead: the joint is far ahead. Only
-                 where the joint presses against its stop while the encoder slips together with its speed does it seem
-                 to move on. An encoder that slips alone is found before (speed_monitor.py). A hand that pushes a joint
-                 in a held pose, or hangs a weight, moves it just so, up to the largest torque: only a torque near the
-                 limit counts there.
+                 equal. A target that moves against a torque near the limit does not lead: the joint is far ahead.
+                 An encoder that slips together with its speed, while the joint presses against its stop, shows just
+                 the motion and torque of a weight that a hand lowers: the control law makes them equal. So such a
+                 joint is probed: its torque is PROBE_NM less in one interval, and again as wanted in the next one.
+                 Whatever drives a joint back, hand, weight, body or mud, then moves it faster, or slower again; an
+                 encoder that slips goes on at its speed. (One that slips alone is found before: speed_monitor.py.)
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -42,11 +43,15 @@ AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
-PRESSING_FRACTION = 0.9  # of the torque limit, in a held pose and without a target
+NEAR_LIMIT_FRACTION = 0.9  # of the torque limit
 DRIVEN_BACK_S = 0.09
-DRIVEN_BACK_RAD = 0.0027  # in each interval, 0.03 rad/s: seven steps of a 14-bit encoder
-DRIVEN_BACK_INTERVALS = 3.0  # in a row; a body that sinks pushes a swing back in two
-STANDING_INTERVAL = 0.6  # of an interval: mud that an insertion displaces pushes a sweep back in two
+DRIVEN_BACK_RAD_S = 0.03  # seven steps of a 14-bit encoder in an interval
+PROBED = 3  # intervals in a row; a body that sinks pushes a swing back in two
+NOT_YIELDED = PROBED + 2  # the probe, and the interval after it
+PROBE_NM = 0.125  # less torque moves a flipper that carries 1 kg by 11 mrad
+PROBE_S = 0.05  # and after it
+STEADY_RAD = 0.002  # within it and a fraction of the path the speed is that of the interval before; more than a
+STEADY_FRACTION = 0.1  # stop of 100 N·m/rad yields to the probe
 LONGEST_GAP_S = 0.03  # between two samples
 PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
 SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
@@ -72,7 +77,7 @@ class MotionMonitor:
         self._joint = joint
         self._half_inertia = 0.5 * dynamics.inertia_kg_m2
         self._runaway_j = runaway_bound_j(torque_nm)
-        self._held_nm = PRESSING_FRACTION * torque_nm
+        self._near_limit_nm = NEAR_LIMIT_FRACTION * torque_nm
         stiffness_nm_rad = dynamics.stiffness_nm_rad
         self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else float("inf"))
         self.reset()
@@ -83,8 +88,14 @@ class MotionMonitor:
         self._target_rad = self._lag_rad = UNKNOWN
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
-        self.driven_back = 0.0  # intervals in a row
+        self.driven_back = 0  # intervals in a row
         self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
+        self._back_rad_s = 0.0  # in the interval before
+
+    @property
+    def probed(self) -> bool:
+        """Return whether the joint's torque is to be PROBE_NM less than wanted, so that a load shows."""
+        return self.driven_back == PROBED
 
     def update(
         self,
@@ -93,11 +104,11 @@ class MotionMonitor:
         dt_s: float,
         torque_nm: float,
         target: JointTarget | None,
-        held: bool,
+        braked: bool = False,
     ) -> None:
         """Add the faults of a new sample. `torque_nm` was commanded for the last `dt_s`; no target: no stiffness.
 
-        `held`: a hand may push a joint whose target stands still.
+        `braked`: every torque is against the motion.
         """
         self._impulse_nm_s += torque_nm * dt_s
         self._elapsed_s += dt_s
@@ -110,26 +121,24 @@ class MotionMonitor:
         step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
         measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
         if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
-            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, held)
+            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, braked)
         self._impulse_nm_s = self._elapsed_s = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
         self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
         following = not self._lag_rad > self._following_rad  # also without a target
-        explained = self.unexplained_j <= self._runaway_j and self.driven_back < DRIVEN_BACK_INTERVALS
+        explained = self.unexplained_j <= self._runaway_j and self.driven_back < NOT_YIELDED
         if not following or not explained or self.away_rad > AWAY_RAD:
             self._report(found, target)
 
-    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float, held: bool) -> None:
+    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float, braked: bool) -> None:
         """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
         target_step_rad = target_rad - self._target_rad
-        excused = target_step_rad != target_step_rad or (held and target_step_rad == 0.0)  # not a number: no target
-        least_nm = self._held_nm if excused else PRESSING_NM
-        if -least_nm < torque_nm < least_nm:
+        if braked or (-PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED):
             self._pressing_nm = torque_nm
-            self.driven_back = self._pressed_s = self._back_rad = 0.0
+            self._end_pressing()
         else:
             self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
@@ -143,28 +152,40 @@ class MotionMonitor:
         away_rad = self.away_rad + (abs(step_rad) - abs(target_step_rad)) + error_rad  # begins again without a target
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
+    def _end_pressing(self) -> None:
+        self.driven_back = 0
+        self._pressed_s = self._back_rad = 0.0
+
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
         lasts = torque_nm * self._pressing_nm >= 0.0
         self._pressing_nm = torque_nm
         if not lasts:
-            self.driven_back = self._pressed_s = self._back_rad = 0.0
+            self._end_pressing()
             return
         back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
-        near_limit = abs(torque_nm) >= self._held_nm
-        leads = target_back_rad > 0.0 and not near_limit
+        near_limit_nm = self._near_limit_nm - PROBE_NM if self.probed else self._near_limit_nm
+        leads = target_back_rad > 0.0 and abs(torque_nm) < near_limit_nm
         self._pressed_s += elapsed_s
         self._back_rad += back_rad - target_back_rad if leads else back_rad
-        if self._pressed_s >= DRIVEN_BACK_S:
-            more = 1.0 if near_limit or target_step_rad else STANDING_INTERVAL
-            self.driven_back = self.driven_back + more if self._back_rad > DRIVEN_BACK_RAD else 0.0
-            self._pressed_s = self._back_rad = 0.0
+        if self._pressed_s >= (DRIVEN_BACK_S if self.driven_back < PROBED else PROBE_S):
+            self._end_interval()
+
+    def _end_interval(self) -> None:
+        """Count an interval. From the probe on the speed must be as before, or the count begins again."""
+        counts = self._back_rad > DRIVEN_BACK_RAD_S * self._pressed_s
+        if self.driven_back >= PROBED:
+            as_before_rad = self._back_rad_s * self._pressed_s
+            counts = abs(self._back_rad - as_before_rad) <= STEADY_RAD + STEADY_FRACTION * as_before_rad
+        self.driven_back = self.driven_back + 1 if counts else 0
+        self._back_rad_s = self._back_rad / self._pressed_s
+        self._pressed_s = self._back_rad = 0.0
 
     def _report(self, found: list[Fault], target: JointTarget | None) -> None:
         if self.unexplained_j > self._runaway_j:
             kind = FaultKind.JOINT_RUNAWAY
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
-        if self.driven_back >= DRIVEN_BACK_INTERVALS:
+        if self.driven_back >= NOT_YIELDED:
             found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
         if self.away_rad > AWAY_RAD:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))

@@ -99,6 +99,9 @@ class AbstractMonitor(FaultMonitor):
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
         return states
 
+    def with_probes(self, wanted: Torques, largest_nm: float) -> Torques:
+        return wanted
+
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         mode, states = monitor_input.mode, monitor_input.states
         closed = [state.closed_loop for state in states]

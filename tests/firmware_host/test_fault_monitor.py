@@ -11,6 +11,7 @@ import pytest
 from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
+from control.monitors.motion_monitor import PROBED
 from control.rate import PERIOD_S
 from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, same_for_all
 from drivers.can.mock_bus import MockBus, MockPort
@@ -263,6 +264,14 @@ def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
     reported_c = [state.temperature_c for state in bench.monitor.with_winding_heat(states)]
     assert reported_c == [30.0, 75.0, 30.0, 30.0]
     assert bench.monitor.with_winding_heat(states)[1]._replace(temperature_c=25.0) == states[1]
+
+
+def test_only_a_joint_that_is_probed_gets_less_than_the_wanted_torque(bench: Bench) -> None:
+    wanted = Joints(0.3, -2.0, 0.3, 0.05)
+    assert bench.monitor.with_probes(wanted, 0.75) is wanted
+    for joint in (1, 2, 3):
+        bench.monitor.joints[joint].motion.driven_back = PROBED
+    assert bench.monitor.with_probes(wanted, 0.75) == (0.3, -0.625, 0.175, 0.0)
 
 
 def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: Bench) -> None:

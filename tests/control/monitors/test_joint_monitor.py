@@ -369,9 +369,9 @@ def test_a_reset_forgets_the_angle_and_the_energy_and_does_not_cool_a_winding() 
     monitor = make_monitor(limits=JointLimits(velocity_rad_s=100.0))
     accelerated(monitor, 20)
     monitor.winding.temperature_c = 95.0
-    assert monitor._motion.unexplained_j > 0.0
+    assert monitor.motion.unexplained_j > 0.0
     monitor.reset()
-    assert monitor._motion.unexplained_j == 0.0
+    assert monitor.motion.unexplained_j == 0.0
     now_s = NOW_S + 20 * PERIOD_S
     assert names_of(monitor, healthy(now_s, angle_rad=0.6), now_s) == {"winding_hot"}
 

@@ -50,7 +50,7 @@ def test_an_inverted_motor_in_mud_of_any_strength_is_found_within_its_energy() -
         for tick in range(1, ticks):
             step_rad = power_w * PERIOD_S / BOUNDS.torque_nm
             state = DriveState(angle_rad=tick * step_rad, velocity_rad_s=0.0, angle_stamp_s=tick * PERIOD_S)
-            monitor.update(found, state, PERIOD_S, -BOUNDS.torque_nm, None, held=False)
+            monitor.update(found, state, PERIOD_S, -BOUNDS.torque_nm, None)
             done_j += BOUNDS.torque_nm * step_rad
             if found:
                 assert done_j < BOUNDS.fault_j(FaultKind.JOINT_RUNAWAY)
