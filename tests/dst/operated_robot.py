@@ -245,7 +245,7 @@ class OperatedRobot:
             self.ended = self._shutdown.step(self.loop, self.now_s)
             if not self.ended:
                 self._suspension.step()
-                self.heard_s = self.now_s
+                self.heard_s = max(self.now_s, self.lockstep.robot.now_s)  # a stopped tick sends its rest at its end
                 self._status.serve(self.now_s)
         except Exception as problem:  # noqa: BLE001 - as in the daemon
             self._report_bug(f"{type(problem).__name__}: {problem}")

@@ -305,4 +305,23 @@ REGRESSIONS = (
             for_s=0.9,
         ),
     ),
+    Regression(
+        "the rest of a tick's torques that left after a stop within it was counted as torque of a silent loop",
+        Scenario(
+            seed=8100077,
+            surroundings=Surroundings(
+                seed=506254,
+                strength_pa=9000.0,
+                depth_m=0.05,
+                drive_type="mit:AK80-6",
+                configuration=(("motion.path_speed_rad_s", 1.7), ("gait.swing_duration_s", 0.4)),
+            ),
+            start="stance",
+            events=(
+                Call(at_s=0.0, client="pilot", method="walk"),
+                Suspend(at_s=0.065, for_s=3.434, inside="bus.right"),
+            ),
+            for_s=3.749,
+        ),
+    ),
 )
