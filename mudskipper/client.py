@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any
 
 from firmware_host.configuration.configuration import StatusParameters
+from mudskipper.ground_and_gait import Gait
 from operator_client.status_client import StatusClient
 
 POLL_S = 0.05
@@ -62,21 +63,27 @@ class Client:
 
     def map(self) -> list[Report]:
         """Return the mud along the track since the walk began."""
-        pieces: list[Report] = []
-        while page := self._client.call("map", after_m=pieces[-1]["place_m"] if pieces else None):
-            pieces += page
-        return pieces
+        return self._client.read_map()
 
     def arm(self, force: str = "") -> None:
         """Energise the joints; `force` names the kind of fault to overrule, such as uncalibrated."""
         self._move("arm", force=force)
 
-    def walk(self, strides: int = 0, depth_m: float | Sequence[float] | None = None, **trial: object) -> None:
+    def walk(
+        self,
+        strides: int = 0,
+        depth_m: float | Sequence[float] | None = None,
+        gait: Gait | str | Path | None = None,
+        **trial: object,
+    ) -> None:
         """Walk so many strides (0: without end), at a fixed depth, at several in turn, or at depths that adapt.
 
+        `gait` is a Gait, a gait file, or the name of one that ships; without it the robot walks its own.
         `trial` describes the walk in its log, a new one: mud, water, trial, operator, tags and note.
         """
         depth = {"depths_m": list(depth_m)} if isinstance(depth_m, Sequence) else {"depth_m": depth_m}
+        if gait is not None:
+            trial["gait"] = (gait if isinstance(gait, Gait) else Gait(gait)).text
         self._move("walk", strides=strides, **depth, **_texts(trial))
 
     def stride(self, depth_m: float, **gait: float) -> None:

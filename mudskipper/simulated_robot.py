@@ -13,23 +13,22 @@ import tomlkit
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import read_text
 from mudskipper.client import POLL_S, Client
+from mudskipper.ground_and_gait import Ground
 from simulation.harness.local_robot import LocalRobot
 from simulation.harness.local_setup import local_copy
-from simulation.harness.world import load_world, parse_world
 
 READY_S = 30.0
-World = str | Path | Mapping[str, Any]
+World = Ground | str | Path | Mapping[str, Any]
 
 
 @contextmanager
 def simulate(world: World | None = None, robot: str | Path | None = None, seed: int = 1) -> Iterator[Client]:
     """Yield a Client of a simulated robot that is ready to arm, in real time; end its processes in any case.
 
-    `world` is a world file or its tables (default: three muds), `robot` the configuration of a robot, without its buses
-    and logs. Everything is in a temporary folder. Raises ConfigurationError and NoDaemonError.
+    `world` is a Ground, a world file or its tables (default: three muds), `robot` the configuration of a robot, without
+    its buses and logs. Everything is in a temporary folder. Raises ConfigurationError and NoDaemonError.
 
-    >>> soft = {"segment": [{"start_m": 0.0, "end_m": 2.0, "strength_pa": 500.0}]}
-    >>> with simulate(soft) as client:
+    >>> with simulate(Ground(strength_pa=500.0)) as client:
     ...     client.arm()
     ...     client.wait_for("hold")["mode"]
     'hold'
@@ -57,13 +56,11 @@ def _world_file(world: World | None, folder: Path) -> Path | None:
     """Return the checked file of a world. Raises ConfigurationError."""
     if world is None:
         return None
-    if isinstance(world, Mapping):
-        path = folder / "world.toml"
-        path.write_text(tomlkit.dumps(world), encoding="utf-8")
-        parse_world(path.read_text(encoding="utf-8"))
-        return path
-    load_world(Path(world))
-    return Path(world).absolute()
+    if not isinstance(world, Ground):
+        world = Ground(**world) if isinstance(world, Mapping) else Ground(world)
+    path = folder / "world.toml"
+    path.write_text(tomlkit.dumps(world.tables), encoding="utf-8")
+    return path
 
 
 def _await_ready(client: Client, processes: LocalRobot) -> None:

@@ -88,6 +88,13 @@ class StatusClient:
             raise CallRefusedError(problem)
         return result
 
+    def read_map(self) -> list[dict[str, Any]]:
+        """Return the mud along the track since the walk began, page after page."""
+        pieces: list[dict[str, Any]] = []
+        while page := self.call("map", after_m=pieces[-1]["place_m"] if pieces else None):
+            pieces += page
+        return pieces
+
     def _receive(self) -> tuple[Any, Any]:
         """Return problem and result; skips an answer to an earlier request, which a Ctrl-C may have left unread."""
         while True:

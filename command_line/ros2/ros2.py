@@ -6,9 +6,10 @@ does. It takes no set-points. A walk is under the daemon's lease (leased_walk.py
 
 import re
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from command_line import exit_codes
 from command_line.errors import explain
@@ -18,8 +19,8 @@ from command_line.shared_options import Socket
 from experiments.study.option import Option, OptionError
 from firmware_host.log.row_stream import stream_path
 from operator_client.row_subscription import RowSubscription
+from operator_client.status_client import StatusClient
 
-LAPTOP_FILES = Path(__file__).with_name("mudskipper_msgs")  # a ROS 2 package: message, launch file, RViz, URDF
 NAMESPACE = re.compile(r"/?([A-Za-z_]\w*(/[A-Za-z_]\w*)*)", re.ASCII)
 Act: TypeAlias = Callable[[], str]
 
@@ -43,13 +44,14 @@ def ros2(
     distribution: Annotated[Literal["jazzy", "humble"], Option("of ROS 2 there, or a newer one: jazzy")] = "jazzy",
     allow_drive: Annotated[bool, Option("also serve 'clear' and 'walk'")] = False,
 ) -> int:
+    from command_line.ros2.own_messages import LAPTOP_FILES
     from command_line.ros2.ros_audience import RosAudience
     from command_line.ros2.ros_node import RosNode, connect
 
     try:
         with connect(router) as session:
             node = RosNode(session, domain, namespace, hashed=distribution != "humble")
-            audience = RosAudience(session, node)
+            audience = RosAudience(session, node, partial(_read_map, socket))
             for name, act in _services(socket, allow_drive).items():
                 node.serve(name, partial(_attempt, act))
             node.watch_others()
@@ -58,6 +60,11 @@ def ros2(
             pass_on(RowSubscription(stream_path(socket)), audience)
     except KeyboardInterrupt:
         return exit_codes.OK
+
+
+def _read_map(socket: Path) -> list[dict[str, Any]]:
+    with closing(StatusClient(socket)) as client:
+        return client.read_map()
 
 
 def _services(socket: Path, allow_drive: bool) -> dict[str, Act]:

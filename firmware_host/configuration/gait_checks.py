@@ -38,11 +38,11 @@ def gait_problems(
     path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate = NOTHING_KNOWN
 ) -> Iterator[str]:
     """Yield what is wrong with a gait: first with its keys, else with its deepest stride in this mud."""
-    problems = list(_key_problems(path)) or list(_stride_problems(path, configuration, depth_m, mud))
+    problems = list(key_problems(path)) or list(_stride_problems(path, configuration, depth_m, mud))
     yield from (f"{path.name or 'gait'}: {problem}" for problem in problems)
 
 
-def _key_problems(path: GaitPath) -> Iterator[str]:
+def key_problems(path: GaitPath) -> Iterator[str]:
     names = [phase.name for phase in path.phase]
     if "swing" not in names or names.index("swing") != len(names) - 1 or len(names) < 2:
         yield f"phase = {', '.join(names) or 'none'}: the last of two or more must be a swing, and no other one"

@@ -45,9 +45,21 @@ def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch:
         assert robot.map() is not None and robot.check() and Path(robot.status()["log"]["path"]).exists()
 
 
+def test_a_gait_of_one_s_own_walks_and_is_checked_for_the_robot(bench: Bench) -> None:
+    with mudskipper.Client(bench.socket) as robot:
+        robot.arm()
+        robot.wait_for("hold")
+        with pytest.raises(mudskipper.CallRefusedError, match="10"):
+            robot.walk(1, gait=mudskipper.Gait("ellipse", depths_m=[0.10]))
+        robot.walk(1, gait=mudskipper.Gait("ellipse", depths_m=[0.021]))
+        assert robot.wait_for("walking")["depth_m"] == 0.021
+        robot.stop()
+        robot.wait_for("hold")
+
+
 def test_the_example_of_simulate_runs_and_its_processes_end() -> None:
     results = doctest.testmod(simulated_robot)
-    assert results.attempted == 2 and not results.failed
+    assert results.attempted and not results.failed
 
 
 @pytest.mark.parametrize("leaves", [RuntimeError, KeyboardInterrupt])

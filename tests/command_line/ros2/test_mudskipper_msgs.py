@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
 from command_line.live.standard_messages import BASE, ODOM, TOPICS, flipper_pose
-from command_line.ros2.ros2 import LAPTOP_FILES
+from command_line.ros2.own_messages import LAPTOP_FILES
 from control.geometry import FlipperGeometry
 from control.records import FLIPPERS, JOINTS
 from firmware_host.log.rows import STRIDE
@@ -25,7 +25,9 @@ def vector(text: str) -> np.ndarray:
     return np.array(text.split(), float)
 
 
-def test_the_message_of_a_stride_is_the_log_s() -> None:
+def test_the_message_of_a_stride_is_the_log_s_and_each_message_is_built() -> None:
+    built = re.findall(r'"msg/(\w+)\.msg"', (LAPTOP_FILES / "CMakeLists.txt").read_text(encoding="utf-8"))
+    assert built == sorted(path.stem for path in (LAPTOP_FILES / "msg").iterdir())
     assert (LAPTOP_FILES / "msg/Stride.msg").read_text(encoding="utf-8") == STRIDE.definition
 
 

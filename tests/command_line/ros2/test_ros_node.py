@@ -22,8 +22,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from command_line import exit_codes
 from command_line.live.standard_messages import TOPICS
 from command_line.ros2 import ros_node
+from command_line.ros2.own_messages import LAPTOP_FILES
 from command_line.ros2.rmw_names import ATTACHMENT, NO_HASH, PUBLISHER, SUBSCRIBER, Endpoint, read_token
-from command_line.ros2.ros2 import LAPTOP_FILES
 from command_line.ros2.ros_audience import RosAudience
 from command_line.ros2.ros_node import RosNode, connect
 from control.records import JOINTS
@@ -32,15 +32,21 @@ from operator_client.live_rows import LiveRow, LiveRows
 from tests.command_line.command_lines import failure
 from tests.waiting import LONGEST_S, wait_until
 
-STRIDE_NAME = "mudskipper_msgs/msg/Stride"
+OWN = {"/stride": "mudskipper_msgs/msg/Stride", "/mud_map": "mudskipper_msgs/msg/MudMap"}
+MUD_MAP: list[dict[str, Any]] = [
+    {"place_m": 0.025, "k_p": {"value": 1.5e6, "std_error": 4e4, "at_least": False}, "k_s": None, "k_e": None},
+    {"place_m": 0.475, "k_p": None, "k_s": {"value": 3e5, "std_error": None, "at_least": True}, "k_e": None},
+]
 GID = bytes(range(16))
 
 
 def types_of_ros() -> Any:
-    """Return ROS 2 Jazzy's definitions, the response of a Trigger, and a stride as another computer has it."""
+    """Return ROS 2 Jazzy's definitions, the response of a Trigger, and this project's messages as on a laptop."""
     types = get_typestore(Stores.ROS2_JAZZY)
     types.register(get_types_from_msg("bool success\nstring message\n", "std_srvs/msg/Trigger_Response"))
-    types.register(get_types_from_msg((LAPTOP_FILES / "msg/Stride.msg").read_text(encoding="utf-8"), STRIDE_NAME))
+    for name in OWN.values():
+        text = (LAPTOP_FILES / "msg" / f"{name.split('/')[-1]}.msg").read_text(encoding="utf-8")
+        types.register(get_types_from_msg(text, name))
     return types
 
 
@@ -103,9 +109,9 @@ def rows(number: int) -> list[LiveRow]:
 @pytest.mark.parametrize("hashed", [True, False], ids=["jazzy", "humble"])
 def test_every_topic_is_seen_and_every_message_decoded_by_other_code(graph: Graph, hashed: bool) -> None:
     node = RosNode(graph.own, 7, "/mud1", hashed)
-    audience = RosAudience(graph.own, node)
+    audience = RosAudience(graph.own, node, lambda: MUD_MAP)
     audience.begin(cast(LiveRows, SimpleNamespace(kinds=list(ROW_KINDS), configuration_text="")))
-    wanted = {f"/mud1{topic}": name for topic, name in {**TOPICS, "/stride": STRIDE_NAME}.items()}
+    wanted = {f"/mud1{topic}": name for topic, name in (TOPICS | OWN).items()}
     number = 0
     while {str(sample.key_expr).split("/", 1)[1].rsplit("/", 2)[0] for sample in graph.received} != {
         name[1:] for name in wanted
@@ -127,6 +133,10 @@ def test_every_topic_is_seen_and_every_message_decoded_by_other_code(graph: Grap
     assert odometry.pose.pose.position.x == 0.7
     assert np.array_equal(odometry.pose.covariance.reshape(6, 6), np.diag([0.0, *[1e6] * 5]))
     assert decoded["/mud1/right/force"].wrench.force.z == 6.0 and decoded["/mud1/stride"].k_p == 2e6
+    mud_map = decoded["/mud1/mud_map"]
+    assert (mud_map.position_m.tolist(), mud_map.k_s_at_least.tolist()) == ([0.025, 0.475], [False, True])
+    assert np.array_equal((mud_map.k_p, mud_map.k_s), [[1.5e6, np.nan], [np.nan, 3e5]], equal_nan=True)
+    assert np.isnan([*mud_map.k_e, *mud_map.k_s_std_error]).all() and mud_map.k_p_std_error[0] == 4e4
     seen = {end.name: (end.node, end.type_name) for end in graph.endpoints() if end.kind == PUBLISHER}
     assert seen == {topic: ("/mud1/mudskipper", name) for topic, name in wanted.items()}
 
