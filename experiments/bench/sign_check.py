@@ -2,21 +2,21 @@
 
 Each joint in turn is shaken, to prove that its encoder works (joint_shake.py). Then its torque grows in small steps
 until it moves, so friction and gravity need not be known; the other joints have none. Drive and encoder must agree:
-angle, velocity and current have the sign of the torque. A drive agrees with itself on any joint and in any mounting, so
-the joint is then moved further under control, and the operator observes which flipper moves, and how.
+angle, velocity and current have the sign of the torque. A drive agrees with itself on any joint and in any mounting:
+that encoder and joint belong together, and count in the right direction, is shown by hands before
+(calibration/hand_steps.py).
 """
 
-from math import nan, radians
+from math import nan
 from statistics import fmean
 
 import numpy as np
 
 from control.controller import measured_angles
 from control.rate import PERIOD_S
-from control.records import DriveStates, Joints, Rig, Torques
+from control.records import DriveStates, Rig, Torques
 from experiments.bench.joint_shake import ADVICE, shake_joint
-from experiments.bench.operator import MOTIONS, Observation
-from experiments.bench.reading import BenchReading, BenchReadings, left_out
+from experiments.bench.reading import BenchReading, BenchReadings
 from experiments.bench.test_rig import TestRig, TickSample, idle, signals, torque_on
 
 STEP_NM = 0.01  # a fifth of the torque that holds an arm of the default mass level
@@ -24,8 +24,6 @@ STEP_S = 0.03  # for the joint to start moving before the next step
 MOST_NM = 0.2  # a quarter of the torque limit and four times the weight of an arm: harmless to fingers
 MOVED_RAD = 0.03  # beyond noise and the slack of a lying plate; the torque ends there
 OTHERS_RAD = 0.02  # motion of another joint by vibration
-SHOWN_RAD = radians(12.0)  # 2.5 cm at the end of an arm: clearly visible
-SHOWING_RAD_S = 0.5
 FEWEST_A = 0.05  # for the sign of the current: noise averages out below that
 
 
@@ -93,29 +91,3 @@ def _agreement(rig: Rig, joint: str, begun: DriveStates, samples: list[TickSampl
         if other != joint:
             advice = f"commands to {joint} reach {other}, or something couples them: check node ids and mechanics"
             yield BenchReading(f"{joint}: {other} meanwhile", other_rad, "rad", -OTHERS_RAD, OTHERS_RAD, advice)
-
-
-def hold_gently(held: Torques, states: DriveStates) -> Torques:
-    """A hold law: holds the pose with a limited torque."""
-    return held.map(lambda torque_nm: min(max(torque_nm, -MOST_NM), MOST_NM))
-
-
-def check_shown_motion(test_rig: TestRig, joint: str) -> BenchReadings:
-    """Check that the operator sees the motion that the encoders report."""
-    index, hand = test_rig.index_of(joint), test_rig.operator.hand
-    test_rig.arm(hold_gently)
-    here = measured_angles(test_rig.run_for(test_rig.configuration.motion.fade_in_s)[-1].states)
-    before_rad = hand.look()
-    there = Joints(*(angle_rad + SHOWN_RAD * (index == other) for other, angle_rad in enumerate(here)))
-    test_rig.move([there], SHOWING_RAD_S, hold_gently)
-    test_rig.run_for(0.3)
-    seen_rad = np.subtract(hand.look(), before_rad).tolist()
-    test_rig.move([here], SHOWING_RAD_S, hold_gently)
-    test_rig.switch_off()
-    observation = test_rig.operator.observed_motion(joint, index, seen_rad, test_rig.run_during_prompt)
-    side, kind = joint.split("_")
-    what = f"{joint}: the {side} flipper was observed to {MOTIONS[kind]}"
-    if observation is Observation.UNSEEN:
-        yield left_out(what)
-        return
-    yield BenchReading(what, observation is Observation.RIGHT, "", 1, 1, observation.value.format(joint=joint))

@@ -1,7 +1,6 @@
-"""The hands and eyes of an operator at a simulated robot: they hold all joints and turn one at a steady speed."""
+"""The hands of an operator at a simulated robot: they hold all joints and turn one at a steady speed."""
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -19,8 +18,7 @@ class SimulatedHand(Hand):
     """Owns where the joints are held."""
 
     def __init__(self, rig: SimulatedRig) -> None:
-        self._plant, self._joints = rig.robot.plant, rig.configuration.rig.joints
-        self._arms = self._plant.arms
+        self._arms, self._joints = rig.robot.plant.arms, rig.configuration.rig.joints
         self._free = [arm.parameters for arm in self._arms]
         self._held_rad: list[float] = []  # empty: not held
         self._index = 0  # of the joint that is turned
@@ -31,8 +29,8 @@ class SimulatedHand(Hand):
     def is_turning(self) -> bool:
         return bool(self._path_rad)
 
-    def hold(self, adduction_rad: float = 0.0) -> None:
-        self._held_rad = [0.0, adduction_rad] * len(self._arms)
+    def hold(self) -> None:
+        self._held_rad = [0.0] * 2 * len(self._arms)
         for arm in self._arms:
             heavy = replace(arm.parameters.arm_mass, sweep_inertia_kg_m2=HELD_KG_M2, adduction_inertia_kg_m2=HELD_KG_M2)
             arm.parameters = replace(arm.parameters, arm_mass=heavy)
@@ -64,10 +62,7 @@ class SimulatedHand(Hand):
             arm.sweep_rad, arm.adduction_rad = self._held_rad[own]
             arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s = velocities_rad_s[own]
 
-    def look(self) -> Sequence[float]:
-        return self._plant.angles_rad
-
 
 def simulated_operator(rig: SimulatedRig) -> BenchOperator:
-    """Return an operator who allows everything, and whose hands and eyes are simulated."""
+    """Return an operator who allows everything, and whose hands are simulated."""
     return BenchOperator(AutomaticOperator(lambda message: None), SimulatedHand(rig), sure=True)

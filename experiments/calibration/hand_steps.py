@@ -1,25 +1,29 @@
 """What an operator's hands show of each joint: its zero, its sign, its range, and the scale of its velocity.
 
 No motor has torque meanwhile, so a wrong sign or zero moves nothing. Angles are measured as the configuration has them;
-`hand_changes` computes what the configuration should say.
+`hand_changes` computes what the configuration should say, and `check_hands` whether it says so.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import chain
-from math import ceil, degrees, floor, pi, radians
+from math import ceil, degrees, floor, inf, pi, radians
+from pathlib import Path
 from statistics import fmean
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from experiments.bench.reading import BenchReading, BenchReadings, left_out
+from experiments.bench.rest_pose_check import ZERO
 from experiments.bench.stroke_tracking import velocity_scale
 from experiments.bench.test_rig import POLL_S, TestRig, TickSample, signals
 from experiments.calibration.joint_picture import draw_joint
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.steps import OperatorStep
-from experiments.study.notebook import Entry
+from experiments.robot.steps import OperatorStep, conduct_steps
+from experiments.study.notebook import Entry, Notebook
 from experiments.study.prompt import GO_ON, REDO, Operator
 from firmware_host.configuration.configuration import Configuration
 
@@ -31,6 +35,7 @@ BEFORE, AGAIN = "redo the one before", "move this joint again"  # by the same ke
 STILL_S, STILL_RAD = 0.3, radians(1.0)
 LEAST_TURN_RAD = radians(30.0)
 MOST_TRIES = 3
+LEVEL_DEG = 5.0  # that a check allows to a hand: 1 cm at the end of an arm
 SHIFTED_RAD = radians(2.0)  # of a zero: the error of a hand with a spirit level
 SCALE_FRACTION = 0.05  # of a velocity's scale; ranges of two firmwares differ by 10 % and more
 ROOM_DEG = 1.0  # of a limit to the stop
@@ -189,3 +194,28 @@ def _velocity_range(joint: str, drive: Any, scale: float) -> float:
             " its encoder in the drive, then calibrate again with --restart."
         )
     return float(round(drive.ranges.velocity_rad_s * scale, 1))
+
+
+def check_hands(test_rig: TestRig) -> BenchReadings:
+    """Check every joint's zero, sign, range and velocity against the configuration."""
+    joints, prompt = test_rig.configuration.rig.joints, test_rig.operator.prompt
+    if prompt is None:
+        yield from (left_out(f"{joint}: moved by hand") for joint in joints)
+        return
+    with TemporaryDirectory() as folder:
+        notebook = Notebook(Path(folder), {})
+        conduct_steps(HandSteps(test_rig, prompt).steps(joints), notebook, prompt, lambda done, total: None, {})
+    for joint, span in zip(joints, test_rig.configuration.joint_ranges, strict=True):
+        zero, ends = ZERO.format(joint=joint), notebook.entries[ends_key(joint)]
+        level_deg = degrees(notebook.entries[level_key(joint.partition("_")[0])][joint])
+        yield BenchReading(f"{joint}: held level and straight out", level_deg, "deg", -LEVEL_DEG, LEVEL_DEG, zero)
+        front_deg, rear_deg = degrees(ends["front_rad"]), degrees(ends["rear_rad"])
+        sign = f"it counts backward: change drive.{joint}.sign, and check its zero then"
+        yield BenchReading(f"{joint}: turned forward or up", front_deg - rear_deg, "deg", 0.0, inf, sign)
+        narrow = f"the limit lies beyond the stop: narrow [limits], or {zero}"
+        yield BenchReading(f"{joint}: lower stop", rear_deg, "deg", -inf, degrees(span.min_rad), narrow)
+        yield BenchReading(f"{joint}: upper stop", front_deg, "deg", degrees(span.max_rad), inf, narrow)
+        scale, advice = ends["velocity_scale"], f"calibrate {joint}: its velocity has another scale than its angle"
+        yield BenchReading(
+            f"{joint}: scale of its velocity", scale, "1", 1.0 - SCALE_FRACTION, 1.0 + SCALE_FRACTION, advice
+        )

@@ -86,7 +86,7 @@ def operator_at(config: pytest.Config) -> BenchOperator:
     if capture is not None:
         capture.resume()
     if has_terminal:
-        return BenchOperator(UncapturedOperator(config), config.option.yes)
+        return BenchOperator(UncapturedOperator(config), sure=config.option.yes)
     if config.option.yes:
         return BenchOperator()
     raise BenchError(

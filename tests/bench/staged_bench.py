@@ -17,13 +17,13 @@ from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import EndedError
 from tests.bench.bench_table import table_lines
 
-STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")
+STAGES = ("wiring", "zeros", "signs", "currents", "watchdogs", "strokes", "stops", "strides")
 P = ParamSpec("P")
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
 
 
 def stage_of(path: Path) -> int:
-    """Return the stage from the name of a file: 3 for test_3_zeros.py, 0 for other files."""
+    """Return the stage from the name of a file: 2 for test_2_zeros.py, 0 for other files."""
     number = path.stem.split("_")[1]
     return int(number) if number.isdigit() else 0
 

@@ -9,10 +9,10 @@ import pytest
 
 from control.modes import Request
 from control.records import DriveState, DriveStates, same_for_all
-from experiments.bench.joint_zero_check import check_rest_pose
 from experiments.bench.lateness import LATE_S
 from experiments.bench.measured_check import MOST_MEASURED
 from experiments.bench.reading import BenchReading, BenchReadings
+from experiments.bench.rest_pose_check import check_rest_pose
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.stop_check import OFF_TICKS, check_torque_off

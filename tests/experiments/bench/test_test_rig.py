@@ -8,14 +8,14 @@ import pytest
 from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.odrive import codec
-from experiments.bench.joint_zero_check import check_level_pose, check_turning
 from experiments.bench.operator import BenchOperator
 from experiments.bench.reading import BenchReading
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.sign_check import check_nudge, check_shown_motion
+from experiments.bench.sign_check import check_nudge
 from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.stroke_tracking import lag_ticks
 from experiments.bench.test_rig import TestRig
+from experiments.calibration.hand_steps import check_hands
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import CLEAR, LEAVE
 from firmware_host.configuration.configuration import Configuration
@@ -108,14 +108,8 @@ def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: Simu
 
 def test_checks_that_need_an_operator_are_left_out_without_one(configuration: Configuration) -> None:
     opened_rig = TestRig(SimulatedRig(configuration), BenchOperator())
-    readings = [
-        *check_level_pose(opened_rig),
-        *check_turning(opened_rig, "left_sweep"),
-        *check_shown_motion(opened_rig, "left_sweep"),
-    ]
-    assert [(reading.left_out, reading.good, reading.value_text) for reading in readings] == [
-        (True, True, "left out")
-    ] * 3
+    readings = [(each.left_out, each.good, each.value_text) for each in check_hands(opened_rig)]
+    assert readings == [(True, True, "left out")] * len(JOINTS)
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -173,9 +167,9 @@ def report_with(*outcomes: str) -> BenchReport:
     ("outcomes", "obstacle"),
     [
         ((), "stage 1, wiring, was not passed in this run"),
-        ((PASSED, FAILED), "stage 2, signs, failed"),
-        ((PASSED, SKIPPED), "stage 2, signs, was not passed"),
-        ((PASSED,), "stage 2, signs, was not passed"),
+        ((PASSED, FAILED), "stage 2, zeros, failed"),
+        ((PASSED, SKIPPED), "stage 2, zeros, was not passed"),
+        ((PASSED,), "stage 2, zeros, was not passed"),
         ((PASSED, PASSED), ""),
     ],
 )
