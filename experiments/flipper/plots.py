@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from control.geometry import FlipperGeometry
 from control.records import COEFFICIENTS, Phase
 from experiments.flipper.modelled_force import modelled_stride
-from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
     GREY,
@@ -18,11 +17,12 @@ from experiments.reports.mud_styles import (
     LABELS,
     PHASE_NAMES,
     PHASE_SHADES,
+    draw_coefficient,
     line_of,
     looks_of,
-    mark_of,
-    waters_of,
+    name_muds,
 )
+from experiments.reports.value_text import N_CM3
 from experiments.study.notebook import Entry
 from experiments.trials.stride_profile import profile_from, stroke_of
 
@@ -88,9 +88,12 @@ def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry]) -> Figure:
     panels = figure.subplots(rows, 3)
     looks = looks_of([mud["mud"] for mud in muds])
     _draw_curves(panels[0], firsts, looks)
-    for column, name in zip(panels[1:].T, COEFFICIENTS, strict=True):
-        for draw, panel in zip((_draw_by_mud, _draw_compared), column, strict=False):
-            draw(panel, muds, name, looks)
+    for (by_mud, *compared), name in zip(panels[1:].T, COEFFICIENTS, strict=True):
+        for x, mud in enumerate(muds):
+            draw_coefficient(by_mud, x, mud[name], looks[mud["mud"]])
+        name_muds(by_mud, [mud["mud"] for mud in muds], f"{LABELS[name]} (N/cm³)")
+        for panel in compared:
+            _draw_compared(panel, muds, name, looks)
     for letter, panel in zip("ABCDEFGHI", panels.flat, strict=False):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
     handles, labels = panels[0][0].get_legend_handles_labels()
@@ -116,36 +119,12 @@ def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
         panel.invert_xaxis()  # in the direction of the motion
 
 
-def _draw_by_mud(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[str, Any]]) -> None:
-    """Draw mean and standard deviation over the trials; a lower bound has an arrow up."""
-    names = [mud["mud"] for mud in muds]
-    waters = waters_of(names)
-    for x, mud in zip(waters or range(len(names)), muds, strict=True):
-        gathered, look = mud[name], looks[mud["mud"]]
-        if gathered.value is None:
-            continue
-        value, sd = PER_CM3 * gathered.value, PER_CM3 * gathered.value * (gathered.repeatability or 0.0)
-        trials = [PER_CM3 * trial for trial in gathered.trials]
-        panel.plot([x] * len(trials), trials, "_", color=GREY, markersize=12)
-        panel.errorbar(x, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=gathered.at_least,
-                       **mark_of(look))  # fmt: skip
-    xlabel = "water content $w$ (%)" if waters else "mud"
-    panel.set(ylim=(0.0, None), xlabel=xlabel, ylabel=f"{LABELS[name]} (N/cm³)")
-    if not waters:
-        panel.set_xticks(range(len(names)), names)
-
-
 def _draw_compared(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[str, Any]]) -> None:
-    """Draw against a load cell's values, with two standard errors, and the grey line on which both are equal."""
-    largest = 0.0
+    """Draw against a load cell's values, with the grey line on which both are equal."""
     for mud in muds:
-        gathered, truth = mud[name], (mud["truth"] or {}).get(name)
-        if gathered.value is None or truth is None:
-            continue
-        value, uncertainty = PER_CM3 * gathered.value, 2.0 * PER_CM3 * (gathered.std_error or 0.0)
-        panel.errorbar(PER_CM3 * truth, value, uncertainty or None, capsize=4, ecolor=INK, linestyle="",
-                       lolims=gathered.at_least, **mark_of(looks[mud["mud"]]))  # fmt: skip
-        largest = max(largest, value + uncertainty, PER_CM3 * truth)
-    panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
+        if truth := (mud["truth"] or {}).get(name):
+            draw_coefficient(panel, truth / N_CM3, mud[name], looks[mud["mud"]])
+    panel.axline((0.0, 0.0), slope=1.0, color=GREY, linewidth=1.0, label="equal")
     panel.set(xlabel=f"{LABELS[name]} by load cell (N/cm³)", ylabel="by the flipper (N/cm³)")
+    panel.set(xlim=(0.0, None), ylim=(0.0, None))
     panel.legend(fontsize="small", loc="upper left")

@@ -52,10 +52,10 @@ MODELLED_PAPER = (
     "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients and the paper's laws."
 )
 CAPTION = (
-    "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
-    "deviation over the trials; each grey dash is a trial."
+    "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean with two standard "
+    "errors; each grey dash is a trial, an arrow a lower bound."
 )
-COMPARED = " G to I: against the load cell, with two standard errors; on the grey line both are equal."
+COMPARED = " G to I: against the load cell; on the grey line both are equal."
 Report = dict[str, Any]  # the summary, as it is in JSON
 Trials = dict[str, list[Entry]]  # by mud
 

@@ -11,9 +11,7 @@ from control.records import COEFFICIENTS
 from experiments.loadcell.analysis import MudCoefficient
 from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
-from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of
-from experiments.reports.value_text import N_CM3
+from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, name_muds
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
@@ -98,17 +96,9 @@ def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
 
 
 def draw_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> Figure:
-    """Draw the mean with two standard errors, and every trial."""
-    figure = Figure(figsize=(11.0, 3.6))
-    names, looks = list(muds), looks_of(list(muds))
+    figure, looks = Figure(figsize=(11.0, 3.6)), looks_of(list(muds))
     for panel, name in zip(figure.subplots(1, 3), COEFFICIENTS, strict=True):
-        for column, mud in enumerate(names):
-            coefficient = muds[mud][name]
-            values = np.array(coefficient.trials) / N_CM3
-            panel.plot(column + 0.18 + np.zeros(len(values)), values, ".", color="grey", markersize=4)
-            value, two_errors = coefficient.value / N_CM3, 2.0 * coefficient.std_error / N_CM3
-            panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
-        panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
-        lowest = min(0.0, panel.get_ylim()[0])  # an error bar that reaches below zero is shown in full
-        panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(lowest, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
+        for x, (mud, own) in enumerate(muds.items()):
+            draw_coefficient(panel, x, own[name], looks[mud])
+        name_muds(panel, list(muds), f"{LABELS[name]} (N/cm³)")
     return figure

@@ -17,7 +17,7 @@ from pandas import DataFrame
 from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.mud_names import mud_key
-from experiments.reports.mud_styles import LABELS, looks_of, mark_of
+from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, mark_of, name_muds
 from experiments.reports.style import FAINT
 from experiments.reports.value_text import N_CM3
 from experiments.run_report.results import SPEED, Entry, run_labels
@@ -30,7 +30,6 @@ MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
 LEGEND_COLUMN_IN = 2.8  # "k_p 1.4 N/cm³, from 3200 s" with its mark
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
 WIDTH_IN, HEIGHT_IN = (6.0, 10.0), 7.2  # with one flipper, and with two
-ROOM = 1.12  # above the largest value, for the arrows of bounds
 DRAWN_OF_FIT = ("torques_nm", "residuals_nm")
 MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
@@ -128,37 +127,26 @@ def _share_scales(panels: Sequence[Axes], heights: Sequence[Floats]) -> None:
 
 
 def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:
-    """Draw speed and coefficients of several runs mud by mud; bars are two standard errors, arrows lower bounds."""
+    """Draw speed and coefficients of several runs mud by mud."""
     labels = [*run_labels(runs, headlines).values()]
-    results = [(run, each) for run, headline in zip(labels, headlines, strict=True) for each in headline["muds"]]
-    muds = {mud_key(result["mud"]): result["mud"] for _, result in results}
-    looks = {name: mark_of(look) for name, look in looks_of(labels).items()}
+    results = [(run, each) for run, headline in enumerate(headlines) for each in headline["muds"]]
+    muds = {mud_key(result["mud"]): result["mud"].replace(" N/cm³", "") for _, result in results}
+    looks = [*looks_of(labels).values()]
     has_speed = any(result["speed_m_s"] is not None for _, result in results)
     figure = Figure(figsize=(10.0, 6.0), layout="constrained")
     axes = figure.subplots(2, 2).flatten() if has_speed else figure.subplots(1, 3)
     for panel, name in zip(axes, [*[SPEED] * has_speed, *COEFFICIENTS], strict=True):
-        for run_name, result in results:
-            offset = WIDTH * ((list(looks).index(run_name) + 0.5) / len(runs) - 0.5)
-            _mark(panel, list(muds).index(mud_key(result["mud"])) + offset, result, name, looks[run_name])
-        panel.set_ylabel("speed (cm/s)" if name == SPEED else f"{LABELS[name]} (N/cm³)")
-        panel.set_xticks(range(len(muds)), [mud.replace(" N/cm³", "") for mud in muds.values()])
-        panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
-        panel.set_ylim(min(0.0, panel.get_ylim()[0]), ROOM * panel.get_ylim()[1])
-    handles = [axes[0].plot([], [], **look, linestyle="", label=run)[0] for run, look in looks.items()]
+        for run, result in results:
+            x = list(muds).index(mud_key(result["mud"])) + WIDTH * ((run + 0.5) / len(runs) - 0.5)
+            speed_m_s, error_m_s = result["speed_m_s"], result["speed_std_error_m_s"]
+            if name != SPEED:
+                draw_coefficient(panel, x, result["both"][name], looks[run])
+            elif speed_m_s is not None:
+                panel.errorbar(x, 100.0 * speed_m_s, error_m_s and 200.0 * error_m_s, **mark_of(looks[run]))
+        name_muds(panel, [*muds.values()], "speed (cm/s)" if name == SPEED else f"{LABELS[name]} (N/cm³)")
+    handles = [
+        axes[0].plot([], [], **mark_of(look), linestyle="", label=run)[0]
+        for run, look in zip(labels, looks, strict=True)
+    ]
     figure.legend(handles=handles, loc="outside upper center", ncols=min(len(runs), 3), frameon=False)
     return figure
-
-
-def _mark(panel: Axes, x: float, result: Entry, name: str, look: dict[str, Any]) -> None:
-    if name == SPEED:
-        value, error, per, is_bound = result["speed_m_s"], result["speed_std_error_m_s"], 0.01, False
-    else:
-        gathered = result["both"][name]
-        value, error, per, is_bound = gathered.value, gathered.std_error, N_CM3, gathered.at_least
-    if value is None:
-        return
-    bar = None if error is None or is_bound else 2.0 * error / per
-    panel.errorbar(x, value / per, bar, **look, linestyle="")
-    if is_bound:
-        arrow = {"arrowstyle": "<-", "color": look["color"]}
-        panel.annotate("", (x, value / per), xytext=(0, 22), textcoords="offset points", arrowprops=arrow)

@@ -294,10 +294,10 @@ def stride_rows(run: Run) -> list[dict[str, Any]]:
             "walk": stride["walk"],
             "stride": stride["index"],
             "mud": stride["mud"] or "at a border",
-            "from": f"{stride['start_s']:.2f}",
-            "depth": f"{stride['depth_m'] / CM:z.1f}",
-            "step": f"{stride['step_m'] / CM:z.1f}".replace("nan", "-"),
-            "lowest supply": f"{stride['supply_v']:.1f}".replace("nan", "-"),
+            "from": stride["start_s"],
+            "depth": stride["depth_m"] / CM,
+            "step": stride["step_m"] / CM,
+            "lowest supply": stride["supply_v"],
             "outcome": stride["outcome"] + ", two surfaces" * bool(stride["two_surfaces"]),
         }
         for stride in run.strides.to_dict("records")
@@ -314,9 +314,8 @@ def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
         row[f"{each.flipper} (N/cm³)"] = text if each.valid or text == "-" else f"({text})"
         speed = f", {each.speed_m_s:.2g} m/s" * isfinite(each.speed_m_s)
         row[f"{each.flipper}: at"] = f"{each.depth_m / CM:.1f} cm{speed}" if isfinite(each.depth_m) else "-"
-        row[f"{each.flipper}: R²"] = f"{each.samples.r_squared:.3f}" if each.samples else "-"
-        residual = f"{N_CM * each.samples.rms_residual_nm:.2f}" if each.samples else "-"
-        row[f"{each.flipper}: residual (N·cm)"] = residual
+        row[f"{each.flipper}: R²"] = each.samples and each.samples.r_squared
+        row[f"{each.flipper}: residual (N·cm)"] = each.samples and N_CM * each.samples.rms_residual_nm
     return list(rows.values())
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import chain, pairwise
+from math import nan
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -13,6 +14,7 @@ from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES
+from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.stride_profile import profile_from, stroke_of
@@ -94,27 +96,22 @@ def _borders_s(plan: WalkTrials, walk: Entry, profile: DataFrame, own: DataFrame
 
 
 def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) -> None:
-    """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
-    methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
-    valid = own[own["method"].isin(methods) & own["valid"].astype(bool)]
+    """Draw the estimates by all methods; arrows are lower bounds, the dashed line the load cell's values."""
+    valid = own[own["valid"].astype(bool)]
     tallest = own["truth"].max() if own["truth"].any() else valid["value"].max() if len(valid) else 1.0
     top = HEADROOM * PER_CM3 * tallest
-    for each in valid.itertuples():
-        style, value = METHOD_STYLES[each.method], PER_CM3 * each.value
-        uncertainty = 2.0 * PER_CM3 * each.std_error if each.method == DEFAULT else None
-        marker = "^" if each.at_least else ("$\\uparrow$" if value > top else style["marker"])
-        panel.errorbar(each.t_end_s - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
-                       color=style["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
-    known = own[own["truth"].notna() & (own["mud"] != "")]
-    for number, (_, there) in enumerate(known.groupby("mud", sort=False)):
-        level = PER_CM3 * there["truth"].median()
-        times_s = there["t_start_s"].min() - begun_s, there["t_end_s"].max() - begun_s
-        label = "_" if number else "load cell"
-        panel.plot(times_s, [level, level], "--", color=GREY, linewidth=1.8, label=label)
-    for method in methods:
-        panel.plot([], [], linestyle="", label=method, **METHOD_STYLES[method])
-    if valid["at_least"].any():
-        panel.plot([], [], linestyle="", label="lower bound", **METHOD_STYLES[DEFAULT] | {"marker": "^"})
+    known = own[own["truth"].notna() & (own["method"] == DEFAULT)]
+    look = {"color": GREY, "linewidth": 1.8, "label": "load cell"}
+    panel.plot(known["t_end_s"] - begun_s, PER_CM3 * known["truth"], "--", **look)
+    for method, style in METHOD_STYLES.items():
+        rows = valid[valid["method"] == method]
+        if method == COMPENSATED and name != "k_s":
+            continue  # it compensates k_s alone
+        errors = 2.0 * PER_CM3 * rows["std_error"] * (method == DEFAULT)
+        bounds = rows["at_least"].astype(bool)
+        values = (PER_CM3 * rows["value"]).clip(upper=0.97 * top)
+        panel.errorbar(rows["t_end_s"] - begun_s, values, errors.mask(bounds, 0.1 * top), lolims=bounds,
+                       linestyle="", linewidth=1.0, markersize=6.0, label=method, **style)  # fmt: skip
     panel.set(ylim=(0.0, top), ylabel=f"{LABELS[name]}\n(N/cm³)")
     panel.legend(ncols=5, **LEGEND)
 
@@ -136,12 +133,14 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     forces.legend(fontsize="small", loc="lower right")
     forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
     deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
-    names: list[str] = []
-    for method, (label, colour) in BARS.items():
-        for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
-            found = each["truth"] if method == LOAD_CELL else each["k_s"].get(method)
-            _draw_bar(bars, len(names), found, colour or _style_of(each["depth_cm"])["color"])
-            names.append(f"{label}\n{each['depth_cm']:g} cm")
+    rows = [
+        _bar(label, colour, each, each["truth"] if method == LOAD_CELL else each["k_s"].get(method))
+        for method, (label, colour) in BARS.items()
+        for each in (deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first)
+    ]
+    names, values, sds, colours, texts, hatches = zip(*rows, strict=True)
+    drawn = bars.bar(range(len(names)), values, 0.7, yerr=sds, color=colours, edgecolor=INK, hatch=hatches, capsize=4)
+    bars.bar_label(drawn, texts, fontsize="small")
     bars.set_xticks(range(len(names)), names, fontsize="small")
     bars.margins(y=0.12)
     bars.set(ylabel="$k_s$ (N/cm³)", ylim=(0.0, None))
@@ -153,20 +152,19 @@ def _style_of(depth_cm: float) -> dict[str, Any]:
     return DEPTH_STYLES.get(depth_cm, {"color": INK})
 
 
-def _draw_bar(panel: Axes, x: int, found: GatheredCoefficient | float | None, colour: str) -> None:
-    """Draw a value, with the standard deviation of the trials from which it was gathered; a lower bound is hatched."""
+def _bar(
+    label: str, colour: str | None, depth: Mapping[str, Any], found: GatheredCoefficient | float | None
+) -> tuple[str, float, float, str, str, str]:
+    """Return name, value, standard deviation of the trials, colour, text and hatch; a lower bound is hatched."""
     gathered = found if isinstance(found, GatheredCoefficient) else None
     value_n_m3 = gathered.value if gathered else found
-    if not isinstance(value_n_m3, float):
-        panel.text(x, 0.0, "-", ha="center", va="bottom")
-        return
-    value, bound = PER_CM3 * value_n_m3, gathered is not None and gathered.at_least
-    sd = value * (gathered.repeatability or 0.0) if gathered else 0.0
-    look: dict[str, Any] = (
-        {"color": "white", "edgecolor": colour, "hatch": "//"} if bound else {"color": colour, "edgecolor": INK}
+    value = PER_CM3 * value_n_m3 if isinstance(value_n_m3, float) else nan
+    bound = gathered is not None and gathered.at_least
+    return (
+        f"{label}\n{depth['depth_cm']:g} cm",
+        value,
+        value * (gathered.repeatability or 0.0) if gathered else 0.0,
+        colour or _style_of(depth["depth_cm"])["color"],
+        f"{'≥ ' * bound}{number(value)}",
+        "//" * bound,
     )
-    panel.bar(x, value, 0.7, linewidth=1.0, **look)
-    if sd:
-        panel.errorbar(x, value, sd, color=INK, capsize=4, linestyle="")
-    text = f"{'≥ ' if bound else ''}{value:.3f}"
-    panel.text(x, value + sd, text, ha="center", va="bottom", fontsize="small")

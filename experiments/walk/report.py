@@ -72,8 +72,8 @@ METHODS = (
 )
 FIGURE_6 = (
     "Figure 6 of the paper, trial {}. A: position of the body; at a vertical line the plates first go down past a "
-    "border. B, C: forces of the {} flipper. D to F: coefficients by stride; bars are two standard errors, triangles "
-    "lower bounds, arrows values beyond the picture, grey dashes the load cell."
+    "border. B, C: forces of the {} flipper. D to F: coefficients by stride; bars are two standard errors, arrows "
+    "lower bounds, grey dashes the load cell. Values beyond the picture are drawn at its edge."
 )
 FIGURE_7 = (
     "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "

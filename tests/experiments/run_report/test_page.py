@@ -47,8 +47,7 @@ def test_each_stride_has_r_squared_and_residual_next_to_its_estimate(run: Run) -
     rows = estimate_rows(run, "k_e")
     assert [(row["walk"], row["stride"]) for row in rows] == [(1, 0), (1, 1), (2, 0)]
     for row, samples in zip(rows, samples_of(run, "right", "k_e"), strict=True):
-        assert row["right: R²"] == f"{samples.r_squared:.3f}"
-        assert row["right: residual (N·cm)"] == f"{100.0 * samples.rms_residual_nm:.2f}"
+        assert (row["right: R²"], row["right: residual (N·cm)"]) == (samples.r_squared, 100.0 * samples.rms_residual_nm)
 
 
 def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: Run) -> None:
