@@ -7,9 +7,7 @@ by the daemon's own driver with a closed transmit gate, so sign and protocol are
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from difflib import unified_diff
 from math import degrees, isfinite, pi
-from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from command_line import exit_codes
@@ -21,7 +19,7 @@ from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
-from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
+from experiments.actuator.file_change import FileChangeError, change_file
 from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
@@ -55,31 +53,26 @@ def zero(
             raise usage_error(f"{name}: this robot has no such joint; {suggestion(name, configuration.rig.joints)}")
     readings = _read(configuration, list(dict.fromkeys(joint)))
     moved = [each for each in readings if each.new_turn != each.old_turn]
+    for each in readings:
+        print(
+            f"{each.joint}: zero_turn {each.old_turn:g} -> {each.new_turn:g}; the joint stood at"
+            f" {each.angle_deg:.2f}°, and moved by {each.motion_deg:.3f}°"
+        )
+    status = exit_codes.OK
+
+    def agrees(difference: str) -> bool:
+        nonlocal status
+        print(difference)
+        if not (is_agreed := yes or _agreed(f"Write this to {config}? [y/N] ")):
+            status = exit_codes.REFUSED if sys.stdin.isatty() else exit_codes.USAGE
+        return is_agreed
+
+    changes = {("drive", each.joint, "zero_turn"): each.new_turn for each in moved}
     try:
-        after = changed_text(text, {("drive", each.joint, "zero_turn"): each.new_turn for each in moved})
-        for each in readings:
-            print(
-                f"{each.joint}: zero_turn {each.old_turn:g} -> {each.new_turn:g}; the joint stood at"
-                f" {each.angle_deg:.2f}°, and moved by {each.motion_deg:.3f}°"
-            )
-        return _replace(config, text, after, yes)
+        print(change_file(config, text, changes, agrees))
     except FileChangeError as problem:
         raise CommandError(str(problem)) from None
-
-
-def _replace(path: Path, before: str, after: str, is_agreed: bool) -> int:
-    if after == before:
-        print(f"{path} needs no change")
-        return exit_codes.OK
-    print(
-        "\n".join(unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", "", "", 0, ""))
-    )
-    if not is_agreed and not _agreed(f"Write this to {path}? [y/N] "):
-        print(f"{path} was left as it is")
-        return exit_codes.REFUSED if sys.stdin.isatty() else exit_codes.USAGE
-    backup = replace_file(path, before, after)
-    print(f"{path} is changed; the old file is {backup.name}. The daemon reads it when it starts")
-    return exit_codes.OK
+    return status
 
 
 def _agreed(question: str) -> bool:

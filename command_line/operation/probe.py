@@ -1,6 +1,5 @@
 """Finds the height of the mud with the flippers of a robot that holds its pose: `mudskipper probe`."""
 
-from difflib import unified_diff
 from math import degrees
 from pathlib import Path
 from sys import stderr
@@ -12,7 +11,7 @@ from command_line.json_output import Answer
 from command_line.screen import Progress, complain
 from command_line.shared_options import Socket
 from experiments.actuator.configuration_change import require_changeable
-from experiments.actuator.file_change import Changes, FileChangeError, changed_text, replace_file
+from experiments.actuator.file_change import Changes, FileChangeError, change_file
 from experiments.reports.text_tables import table
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.surface_probe import ProbedSurface, probe_surface
@@ -49,7 +48,8 @@ def probe(
     status = exit_codes.OK
     try:
         if config:
-            write(config, text, changes)
+            done = change_file(config, text, changes, show_difference)
+            print(f"{done}. 'systemctl restart mudskipper' uses it", file=stderr)
     except FileChangeError as problem:  # such as a greatest depth that is out of reach then
         complain(str(problem))
         status = exit_codes.REFUSED
@@ -82,11 +82,7 @@ def probe_report(found: ProbedSurface, changes: Changes) -> dict[str, Any]:
     return summary | {key: value for (*_, key), value in changes.items()} | {"touches": touches}
 
 
-def write(path: Path, before: str, changes: Changes) -> None:
-    """Write the keys, and show the difference. Raises FileChangeError."""
-    after = changed_text(before, changes)
-    backup = replace_file(path, before, after)
-    shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
-    print(
-        *shown, f"the old file is {backup.name}; 'systemctl restart mudskipper' uses the new one", sep="\n", file=stderr
-    )
+def show_difference(difference: str) -> bool:
+    """Return True: whoever names a file has agreed to its change."""
+    print(difference, file=stderr)
+    return True

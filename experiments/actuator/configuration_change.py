@@ -5,11 +5,10 @@ The operator sees the difference first. See experiments.actuator.file_change.py 
 
 import os
 from collections.abc import Sequence
-from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
-from experiments.actuator.file_change import Changes, FileChangeError, changed_text, replace_file
+from experiments.actuator.file_change import Changes, FileChangeError, change_file
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
 from experiments.study.session import Ending, Session
@@ -18,6 +17,10 @@ from firmware_host.configuration.toml_records import read_text
 COPY = "mudskipper.toml"  # of a simulated robot's configuration
 LARGEST_UNCERTAINTY = 0.02  # relative, of a torque constant that is written
 WRITE, LEAVE = "y", ""
+SET_DRIVES = (
+    ". Set odrv0.axis0.config.motor.torque_constant of the drives to the same values, then 'systemctl restart"
+    " mudskipper'"
+)
 
 
 def find_target(path: Path, text: str, session: Session) -> Path:
@@ -59,19 +62,17 @@ def fitted_changes(fits: Sequence[JointFit], session: Session) -> dict[tuple[str
 
 def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, Ending]:
     """Show the difference, write it if the operator agrees, and return a message."""
-    operator, before = session.operator, read_text(path)
+    operator, is_written = session.operator, False
+
+    def agrees(difference: str) -> bool:
+        nonlocal is_written
+        operator.report(difference)
+        answers = {WRITE: "write it", LEAVE: "leave it"}
+        is_written = operator.ask(f"Write this to {path}?", answers, lambda: None) == WRITE
+        return is_written
+
     try:
-        after = changed_text(before, changes)
-        if after == before:
-            return f"{path} needs no change", Ending.DONE
-        shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
-        operator.report("\n".join(shown))
-        if operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
-            return f"{path} was left as it is", Ending.DONE
-        backup = replace_file(path, before, after)
+        done = change_file(path, read_text(path), changes, agrees)
     except FileChangeError as problem:
         return f"nothing was applied: {problem}: the measurements are saved", Ending.REFUSED
-    return (
-        f"{path} is changed; the old file is {backup.name}. Set odrv0.axis0.config.motor.torque_constant of the drives"
-        " to the same values, then 'systemctl restart mudskipper'"
-    ), Ending.DONE
+    return done + SET_DRIVES * is_written, Ending.DONE

@@ -5,7 +5,8 @@ old or the new one, and the old one stays next to it as `.before`.
 """
 
 import os
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
+from difflib import unified_diff
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,17 @@ def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: Any) 
         value = inline
     table[path[-1]] = value
     body.extend(trailing)
+
+
+def change_file(path: Path, before: str, changes: Changes, agrees: Callable[[str], bool]) -> str:
+    """Replace the file where `agrees` accepts the difference, and return a message. Raises FileChangeError."""
+    after = changed_text(before, changes)
+    if after == before:
+        return f"{path} needs no change"
+    shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
+    if not agrees("\n".join(shown)):
+        return f"{path} was left as it is"
+    return f"{path} is changed; the old file is {replace_file(path, before, after).name}"
 
 
 def replace_file(path: Path, before: str, after: str) -> Path:
