@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from pandas import DataFrame
 
 from experiments.reports.mud_styles import name_decades
 from experiments.reports.style import FAINT, FORWARD
@@ -36,20 +36,17 @@ def draw_speeds(points: Sequence[Mapping[str, Any]]) -> Figure:
 def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> None:
     values = [point["values"][key] for point in points]
     is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-    names = sorted(set(values)) if is_number else list(dict.fromkeys(map(_text, values)))
-    x = np.array(values, dtype=float) if is_number else np.array([names.index(_text(value)) for value in values])
-    speeds, spread = (
-        np.array([100.0 * point[name] for point in points], dtype=float) for name in ("speed_m_s", "speed_sd_m_s")
-    )
-    panel.errorbar(x, speeds, np.nan_to_num(spread), linestyle="", marker=".", color=FAINT, elinewidth=0.6, alpha=0.7)
-    if len(names) <= FEW:
-        places = np.unique(x)
-        means = [np.nanmean(own) if np.isfinite(own := speeds[x == place]).any() else np.nan for place in places]
-        panel.plot(places, means, "o-" if is_number else "o", color=FORWARD)
+    x = values if is_number else list(map(_text, values))  # names have an axis of their own
+    speeds, sds = ([100.0 * point[name] for point in points] for name in ("speed_m_s", "speed_sd_m_s"))
+    drawn = DataFrame({"x": x, "cm/s": speeds, "sd": sds})
+    look: dict[str, Any] = {"linestyle": "", "marker": ".", "color": FAINT, "elinewidth": 0.6, "alpha": 0.7}
+    panel.errorbar(drawn["x"], drawn["cm/s"], drawn["sd"].fillna(0.0), **look)
+    means = drawn.groupby("x", sort=is_number)["cm/s"].mean()
+    if len(means) <= FEW:
+        panel.plot(means.index, means, "o-" if is_number else "o", color=FORWARD)
     if not is_number:
-        panel.set_xticks(range(len(names)), names)
-        panel.set_xlim(-0.5, len(names) - 0.5)
-    elif x.min() > 0.0 and x.max() >= DECADE * x.min():
+        panel.set_xlim(-0.5, len(means) - 0.5)
+    elif min(x) > 0.0 and max(x) >= DECADE * min(x):
         panel.set_xscale("log")
         name_decades(panel.xaxis)
     panel.set_xlabel(key, fontsize="small")
