@@ -30,12 +30,7 @@ Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
 DASHED: dict[str, Any] = THIN | {"linestyle": "--"}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
-STRIDE_PANELS: tuple[tuple[str, dict[str, Any]], ...] = (  # label and legend
-    ("depth (cm)", {"loc": "center", "bbox_to_anchor": (0.82, 0.62)}),
-    ("joint angle (°)", {"loc": "center left", "bbox_to_anchor": (0.06, 0.5)}),
-    ("$f_z$ up (N)", {"ncols": 3, "loc": "upper right"}),
-    ("$f_x$ forward (N)", {"ncols": 2, "loc": "upper right"}),
-)
+STRIDE_PANELS = ("depth (cm)", "joint angle (°)", "$f_z$ up (N)", "$f_x$ forward (N)")
 
 
 def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
@@ -61,9 +56,9 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     panels[0].invert_yaxis()
     for panel in panels[2:]:
         panel.axhline(0.0, color=GREY, linewidth=0.6)
-    for letter, panel, (label, legend) in zip("BCDE", panels, STRIDE_PANELS, strict=True):  # the paper's A is a drawing
+    for letter, panel, label in zip("BCDE", panels, STRIDE_PANELS, strict=True):  # the paper's A is a drawing
         panel.set_ylabel(label)
-        panel.legend(fontsize="small", **legend)
+        panel.legend(ncols=3, loc="upper right", fontsize="small")
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
         panel.margins(x=0.0)
     for phase, name in PHASE_NAMES.items():

@@ -147,20 +147,11 @@ def _draw_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
         marked = [s for s in known if (bool(s[f"{name}_at_least"]), bool(s[f"{name}_valid"])) == (at_least, valid)]
         stamps_s, values, errors = _columns(marked, "stamp_s", name, f"{name}_std_error")
         look: dict[str, Any] = {"color": colour, "elinewidth": 1.2, "markerfacecolor": colour if valid else "white"}
+        look["label"] = ("lower bound" * at_least or "not valid" * (not valid)) * bool(marked)
         bars = np.where(np.isfinite(errors), 2.0 * errors / 1e6, np.nan)
         panel.errorbar(stamps_s, values / 1e6, bars, fmt="^" if at_least else "o", markersize=5, **look)
     largest = max((stride[name] / 1e6 for stride in walk.strides if np.isfinite(stride[name])), default=0.0)
     panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
-    if name == COEFFICIENTS[0]:
-        _explain_coefficients(panel, walk)
-
-
-def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
-    """Explain the marks in the panels of coefficients that occur."""
-    if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.own_strides):
-        panel.plot([], [], "^", color=FAINT, label="lower bound")
-    if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.own_strides):
-        panel.plot([], [], "o", color=FAINT, markerfacecolor="white", label="not valid")
     if walk.noticed_s:
         look = MARKS if len(walk.noticed_s) > MOST_DASHES else DASHES
         panel.plot([], [], **look, label="another mud noticed")

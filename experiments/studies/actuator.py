@@ -42,6 +42,9 @@ Lever = Annotated[
     float | None, Option("axle to weight (default: the flipper's length)", low=1.0, high=100.0, unit="cm")
 ]
 Weights = Annotated[Any, Option("in grams (default: the paper's)", metavar="G,G,...", parse=parse_weights)]
+LeverTolerance = Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")]
+WeightTolerance = Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")]
+Passes = Annotated[int, Option("passes through them", low=1, high=100)]
 
 
 def study(
@@ -49,10 +52,10 @@ def study(
     *,
     joint: Annotated[tuple[str, ...], Option("to calibrate", choices=JOINTS)] = ("right_adduction", "right_sweep"),
     lever: Lever = None,
-    lever_tolerance: Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")] = 1.0,
+    lever_tolerance: LeverTolerance = 1.0,
     weights: Weights = PAPER_WEIGHTS_G,
-    weight_tolerance: Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")] = 0.1,
-    trials: Annotated[int, Option("passes through them", low=1, high=100)] = PAPER_TRIALS,
+    weight_tolerance: WeightTolerance = 0.1,
+    trials: Passes = PAPER_TRIALS,
     gravity: Annotated[float, Option("local gravity", low=9.7, high=9.9, unit="m/s²", metavar="M/S2")] = GRAVITY_M_S2,
     apply: Annotated[bool, Option("write the fitted constants to the configuration, after a prompt")] = False,
     config: Annotated[Path | None, Option(f"to change (default: {INSTALLED})")] = None,

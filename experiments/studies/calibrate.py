@@ -16,7 +16,7 @@ from experiments.actuator.simulation import bench_configuration
 from experiments.calibration.calibration import calibrate_robot
 from experiments.calibration.report import FILES as FILES
 from experiments.calibration.robots import CalibratedRobot, build_with_errors
-from experiments.studies.actuator import INSTALLED, Lever, parse_weights
+from experiments.studies.actuator import INSTALLED, Lever, LeverTolerance, Passes, WeightTolerance, parse_weights
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
@@ -33,12 +33,12 @@ def study(
     joint: Annotated[tuple[str, ...], Option("to calibrate (default: all)", choices=JOINTS)] = (),
     operator: Annotated[str | None, Option("of the record (default: this user)")] = None,
     lever: Lever = None,
-    lever_tolerance: Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")] = 1.0,
+    lever_tolerance: LeverTolerance = 1.0,
     weights: Annotated[
         Any, Option("in grams (default: 100,200,400)", metavar="G,G,...", parse=parse_weights)
     ] = WEIGHTS_G,
-    weight_tolerance: Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")] = 0.1,
-    trials: Annotated[int, Option("passes through them", low=1, high=100)] = TRIALS,
+    weight_tolerance: WeightTolerance = 0.1,
+    trials: Passes = TRIALS,
     practise: Annotated[bool, Option("on a simulated robot whose errors are to be found; its hands obey")] = False,
     seed: Annotated[int, Option("of the simulated robot")] = 1,
 ) -> Result:

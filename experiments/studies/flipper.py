@@ -51,6 +51,8 @@ torque_nm = {BENCH_TORQUE_NM}
 lead_deg = 12.0  # reaches that torque with the default stiffness
 """
 DRIVE = f"current_limit_a = {BENCH_CURRENT_A}"
+Depth = Annotated[float, Option("of insertion", above=0.0, high=20.0, unit="cm")]
+TruthFile = Annotated[Path | None, Option("summary.json of a loadcell experiment")]
 
 
 def study(
@@ -58,11 +60,11 @@ def study(
     *,
     mud: Annotated[tuple[str, ...], Option("as its water in percent")] = (),
     trials: Annotated[int, Option("of each mud", low=1, high=100)] = 3,
-    depth: Annotated[float, Option("of insertion", above=0.0, high=20.0, unit="cm")] = 3.0,
+    depth: Depth = 3.0,
     strides: Annotated[int, Option("of each trial", low=1, high=100)] = 1,
     flipper: Annotated[Literal["left", "right"], Option("in the mud")] = "right",
     motors: Annotated[Literal[2, 4], Option("of the simulated robot: 2 for that flipper alone")] = 4,
-    truth: Annotated[Path | None, Option("summary.json of a loadcell experiment")] = None,
+    truth: TruthFile = None,
 ) -> Result:
     """A single flipper on a fixed base: coefficients of muds."""
     muds = tuple(dict.fromkeys(mud_name(each) for each in mud)) or (MUDS if session.simulated else ())

@@ -19,7 +19,7 @@ from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.session import Session
 from experiments.study.trials import Trials
-from experiments.study.values import mud_length
+from experiments.study.values import MudLengths
 from experiments.trackway import bench
 from experiments.trackway.figures import walk_figures
 from experiments.trackway.plots import draw_trackway
@@ -156,14 +156,7 @@ def robot(
     session: Session,
     *,
     trials: Number = TRIALS,
-    mud: Annotated[
-        tuple[tuple[str, float], ...],
-        Option(
-            "of a real trackway, and its length (default: 61), one after the other (default: the paper's)",
-            metavar="NAME[=CM]",
-            parse=mud_length,
-        ),
-    ] = (),
+    mud: MudLengths = (),
 ) -> Result:
     """Walk the real trackway. Raises BenchError."""
     trackway = bench.Trackway(bench.muds_of(mud) or PAPERS_MUDS, trials)

@@ -5,17 +5,17 @@ Its simulated bench has fresh copies of the trackway along one track, and then t
 
 from functools import partial
 from math import fsum
-from pathlib import Path
 from typing import Annotated, Literal
 
 from experiments.reports.mud_names import mud_name
 from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.studies.flipper import Depth, TruthFile
 from experiments.study.notebook import Notebook
 from experiments.study.option import Option
 from experiments.study.prompt import Operator
 from experiments.study.result import Result
 from experiments.study.session import Session
-from experiments.study.values import mud_length
+from experiments.study.values import MudLengths
 from experiments.trackway.bench import muds_of
 from experiments.trials.mud_trials import (
     MOST_ATTEMPTS,
@@ -49,19 +49,12 @@ SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_error_m:.4g}  # as an 
 def study(
     session: Session,
     *,
-    mud: Annotated[
-        tuple[tuple[str, float], ...],
-        Option(
-            "as its water in percent, and its length (default: 61), in the order of the trackway",
-            metavar="NAME[=CM]",
-            parse=mud_length,
-        ),
-    ] = (),
+    mud: MudLengths = (),
     trials: Annotated[int, Option("over the muds", low=1, high=100)] = 3,
-    depth: Annotated[float, Option("of insertion", above=0.0, high=20.0, unit="cm")] = 3.0,
+    depth: Depth = 3.0,
     soft: Annotated[tuple[str, ...], Option("mud for additional walks at 3 and at 5 cm")] = (),
     flipper: Annotated[Literal["left", "right"], Option("to evaluate")] = "right",
-    truth: Annotated[Path | None, Option("summary.json of a loadcell experiment")] = None,
+    truth: TruthFile = None,
 ) -> Result:
     """The walking robot over several muds: their coefficients."""
     muds = muds_of(mud) or (MUDS if session.simulated else ())

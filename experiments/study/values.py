@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 from experiments.study.option import Option
 
@@ -18,6 +19,16 @@ def mud_length(text: str) -> tuple[str, float]:
     except argparse.ArgumentTypeError as problem:
         raise argparse.ArgumentTypeError(f"{text}: the length {problem}") from None
     raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length, such as 47.6=61")
+
+
+MudLengths = Annotated[
+    tuple[tuple[str, float], ...],
+    Option(
+        "as its water in percent, and its length (default: 61), in the order of the track",
+        metavar="NAME[=CM]",
+        parse=mud_length,
+    ),
+]
 
 
 def folder(text: str) -> Path:

@@ -13,7 +13,7 @@ from control.records import COEFFICIENTS, Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
 from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES
+from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES, line_of, looks_of
 from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
@@ -33,17 +33,13 @@ METHOD_STYLES: dict[str, dict[str, Any]] = {
 }
 LOAD_CELL = "load cell"
 BARS = {
-    KNOWN: ("paper's law", None),  # in the colour of its depth, as in the paper
+    KNOWN: ("paper's law", None),  # in the colour of its depth
     KNOWN_COMPENSATED: ("paper's law\nwith drag", "tab:green"),
     DEFAULT: ("default", "tab:purple"),
     LOAD_CELL: ("load cell", "#d9d9d9"),
 }
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
 HEADROOM = 2.0  # height of a panel over the largest true or own value; higher values are drawn at the edge
-DEPTH_STYLES: dict[float, dict[str, Any]] = {
-    3.0: {"color": "tab:orange", "linestyle": "--"},  # as in the paper
-    5.0: {"color": "tab:blue", "linestyle": "-"},
-}
 
 
 def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: float) -> Figure:
@@ -123,10 +119,11 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
     figure = Figure(figsize=(11.0, 4.2))
     forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
+    looks = looks_of([f"{depth_cm:g} cm" for depth_cm in walks])
     for depth_cm, trials in walks.items():
-        stance, label = stroke_of(profile_from(trials[0]), Phase.STANCE), f"z = {depth_cm:g} cm"
+        stance, label = stroke_of(profile_from(trials[0]), Phase.STANCE), f"{depth_cm:g} cm"
         time_s = stance["time_s"] - stance["time_s"].min()
-        forces.plot(time_s, stance["force_x_n"], linewidth=1.4, label=label, **_style_of(depth_cm))
+        forces.plot(time_s, stance["force_x_n"], label=f"z = {label}", **line_of(looks[label]))
     forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
                    label=f"half of the paper's {PAPER_DRAG_N:g} N of body drag")  # fmt: skip
     forces.set(xlabel="time in stance (s)", ylabel="$f_x$ of one flipper (N)", ylim=(0.0, None))
@@ -134,7 +131,12 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
     deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
     rows = [
-        _bar(label, colour, each, each["truth"] if method == LOAD_CELL else each["k_s"].get(method))
+        _bar(
+            label,
+            colour or looks[f"{each['depth_cm']:g} cm"]["color"],
+            each,
+            each["truth"] if method == LOAD_CELL else each["k_s"].get(method),
+        )
         for method, (label, colour) in BARS.items()
         for each in (deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first)
     ]
@@ -148,13 +150,9 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     return figure
 
 
-def _style_of(depth_cm: float) -> dict[str, Any]:
-    return DEPTH_STYLES.get(depth_cm, {"color": INK})
-
-
 def _bar(
-    label: str, colour: str | None, depth: Mapping[str, Any], found: GatheredCoefficient | float | None
-) -> tuple[str, float, float, str, str, str]:
+    label: str, colour: Any, depth: Mapping[str, Any], found: GatheredCoefficient | float | None
+) -> tuple[str, float, float, Any, str, str]:
     """Return name, value, standard deviation of the trials, colour, text and hatch; a lower bound is hatched."""
     gathered = found if isinstance(found, GatheredCoefficient) else None
     value_n_m3 = gathered.value if gathered else found
@@ -164,7 +162,7 @@ def _bar(
         f"{label}\n{depth['depth_cm']:g} cm",
         value,
         value * (gathered.repeatability or 0.0) if gathered else 0.0,
-        colour or _style_of(depth["depth_cm"])["color"],
+        colour,
         f"{'≥ ' * bound}{number(value)}",
         "//" * bound,
     )
