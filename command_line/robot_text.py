@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
-from experiments.reports.value_text import N_CM3, value_text
+from experiments.reports.value_text import coefficient_text
 
 Report: TypeAlias = dict[str, Any]
 Part: TypeAlias = tuple[str, str]  # a text and its style
@@ -55,9 +55,8 @@ def position_text(report: Report) -> str:
 
 def at_depth(estimate: Report) -> str:
     """Return a coefficient in N/cm³ with the depth for which it was estimated."""
-    bound = "≥ " if estimate["at_least"] else ""
-    value = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    return f"{bound}{value} at {cm(estimate['depth_m'])} cm"
+    text = coefficient_text(estimate["value"], estimate["std_error"], at_least=estimate["at_least"])
+    return f"{text} at {cm(estimate['depth_m'])} cm"
 
 
 # faults and notices

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from experiments.reports.text_tables import number
-from experiments.reports.value_text import N_CM3, value_text
+from experiments.reports.value_text import coefficient_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 QUIET_S = 2.0  # before progress is shown
@@ -102,8 +102,7 @@ def coefficient(estimate: dict[str, Any]) -> str:
     """Format an estimate in N/cm³ with its standard error; ≥ marks a lower bound, brackets an invalid one."""
     if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
-    text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    text = f"≥ {text}" if estimate["at_least"] else text
+    text = coefficient_text(estimate["value"], estimate["std_error"], at_least=estimate["at_least"])
     return text if estimate["valid"] else f"({text})"
 
 

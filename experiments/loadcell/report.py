@@ -28,7 +28,7 @@ from experiments.loadcell.stage import TrialPlan
 from experiments.loadcell.stage_track import common_alignment
 from experiments.loadcell.strokes import INSERTION, RATE_EXPONENT, AnalysedTrial, StageSettings
 from experiments.reports.mud_names import mud_key, mud_text
-from experiments.reports.value_text import N_CM3, miss_text, repeatability_text, value_text
+from experiments.reports.value_text import coefficient_text, miss_text, repeatability_text, value_text
 from experiments.study.notebook import Notebook
 from experiments.study.option import OptionError
 from experiments.study.result import Figure, Result, Table, to_json
@@ -159,7 +159,7 @@ def _coefficient_table(muds: Muds) -> Table:
     for mud, coefficients in muds.items():
         rows.append({"mud": mud_text(mud)})
         for name, each in coefficients.items():
-            rows[-1][name] = value_text(each.value, each.trials_error, each.shared_error, per=N_CM3)
+            rows[-1][name] = coefficient_text(each.value, each.trials_error, each.shared_error)
             rows[-1][f"repeatability of {name}"] = repeatability_text(each.repeatability, len(each.trials))
     return Table("coefficients", HEADING, UNITS, DataFrame(rows), "Coefficients")
 
@@ -169,8 +169,8 @@ def _comparison_row(row: Mapping[str, Any]) -> dict[str, str]:
     return {
         "mud": mud_text(row["mud"]),
         "": row["coefficient"],
-        "flipper": bound + value_text(row["sensed"], row["sensed_std_error"], per=N_CM3),
-        "load cell": value_text(row["truth"], row["truth_std_error"], per=N_CM3),
+        "flipper": coefficient_text(row["sensed"], row["sensed_std_error"], at_least=row["at_least"]),
+        "load cell": coefficient_text(row["truth"], row["truth_std_error"]),
         "flipper / load cell": bound + value_text(row["ratio"], row["ratio_std_error"]),
     }
 
@@ -179,7 +179,7 @@ def _truth_table(muds: Muds, truths: Mapping[str, Truth]) -> Table:
     rows = []
     for mud, coefficients in muds.items():
         true = truths[mud]
-        rows.append({"mud": mud_text(mud)} | {name: value_text(true[name], per=N_CM3) for name in COEFFICIENTS})
+        rows.append({"mud": mud_text(mud)} | {name: coefficient_text(true[name]) for name in COEFFICIENTS})
         rows[-1] |= {f"{name} error": miss_text(coefficients[name].value, true[name]) for name in COEFFICIENTS}
     return Table("truth", TRUTH, UNITS, DataFrame(rows), "The simulated muds themselves")
 
@@ -188,7 +188,7 @@ def _trial_row(trial: AnalysedTrial) -> dict[str, Any]:
     row: dict[str, Any] = {"trial": f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"}
     for name in COEFFICIENTS:
         estimate = trial.coefficients.get(name)
-        row[name] = "" if estimate is None else value_text(estimate.value, estimate.std_error, per=N_CM3)
+        row[name] = "" if estimate is None else coefficient_text(estimate.value, estimate.std_error)
     row["speed"] = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
     row["measured (cm)"] = "-"  # the depth of an insertion, or the travel of a shear
     if trial.positions_m is not None:

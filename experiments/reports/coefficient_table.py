@@ -21,9 +21,8 @@ from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_CONSTANT_UNCERTAINTY
 from experiments.reports.error_table import Row, error_rows
 from experiments.reports.mud_names import mud_text
-from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
+from experiments.reports.value_text import coefficient_text, fraction_text, repeatability_text
 
-PER_CM3 = 1.0 / N_CM3
 EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: value, std_error, valid, at_least, ...
 NUMBERS = ["value", "std_error", "repeatability", "truth", "upright"]  # N/m³
 COLUMNS = ["setup", "mud", "method", "trial", "t_start_s", "t_end_s", "plates_m", "coefficient", "kind", "valid",
@@ -138,14 +137,11 @@ def error_table(rows: DataFrame, setup: str) -> list[Row]:
 # tables for people
 
 
-def coefficient_text(gathered: GatheredCoefficient) -> str:
+def gathered_text(gathered: GatheredCoefficient) -> str:
     """Format in N/cm³, with the errors of the trials and the shared one, or the one error of a single trial."""
-    if gathered.value is None:
-        return "-"
     errors = (gathered.trials_error, gathered.shared_error)
     errors = (gathered.std_error, None) if gathered.trials_error is None else errors
-    text = value_text(gathered.value, *errors, per=N_CM3)
-    return f"≥ {text}" if gathered.at_least else text
+    return coefficient_text(gathered.value, *errors, at_least=gathered.at_least)
 
 
 def mud_table(muds: Sequence[Mapping[str, Any]]) -> DataFrame:
@@ -155,9 +151,9 @@ def mud_table(muds: Sequence[Mapping[str, Any]]) -> DataFrame:
         row = {"mud": mud_text(mud["mud"])}
         for name in COEFFICIENTS:
             gathered: GatheredCoefficient = mud[name]
-            row[f"{name} (N/cm³)"] = coefficient_text(gathered)
+            row[f"{name} (N/cm³)"] = gathered_text(gathered)
             row[f"{name} repeatability"] = repeatability_text(gathered.repeatability, len(gathered.trials))
-            row[f"{name} load cell"] = value_text((mud["truth"] or {}).get(name), per=N_CM3)
+            row[f"{name} load cell"] = coefficient_text((mud["truth"] or {}).get(name))
         rows.append(row)
     return DataFrame(rows)
 

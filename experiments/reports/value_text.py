@@ -26,6 +26,11 @@ def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> 
     return " ± ".join([f"{value:.{ends}f}", *errors_text])
 
 
+def coefficient_text(value: float | None, *errors: float | None, at_least: bool = False) -> str:
+    """Format in N/cm³; ≥ marks a lower bound."""
+    return f"{'≥ ' * at_least}{value_text(value, *errors, per=N_CM3)}"
+
+
 def fraction_text(fraction: float | None) -> str:
     """Format in percent, to two significant digits or a thousandth; a dash for none."""
     if fraction is None or not isfinite(fraction):

@@ -19,7 +19,7 @@ from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
-from experiments.reports.value_text import N_CM3, value_text
+from experiments.reports.value_text import N_CM3, coefficient_text, value_text
 from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds
 from experiments.run_report.results import (
     SHOWN,
@@ -190,12 +190,8 @@ def _fits_caption(run: Run, headline: Entry) -> str:
 
 
 def coefficient_cell(gathered: GatheredCoefficient) -> str:
-    """Format in N/cm³ with the whole standard error; ≥ marks a lower bound."""
-    if gathered.value is None:
-        return "-"
-    if gathered.at_least:
-        return f"≥ {gathered.value / N_CM3:#.2g}"
-    return value_text(gathered.value, gathered.std_error, per=N_CM3)
+    """Format in N/cm³ with the whole standard error."""
+    return coefficient_text(gathered.value, gathered.std_error, at_least=gathered.at_least)
 
 
 def counts_cell(outcomes: Mapping[str, int]) -> str:
@@ -223,7 +219,7 @@ def _flipper_rows(headline: Entry) -> list[dict[str, Any]]:
         for name in COEFFICIENTS:
             left, right = (result["flippers"][flipper][name] for flipper in ("left", "right"))
             cells = {"left": coefficient_cell(left), "right": coefficient_cell(right)}
-            difference = value_text(*flipper_difference(left, right), per=N_CM3)
+            difference = coefficient_text(*flipper_difference(left, right))
             rows.append({"mud": result["mud"], "coefficient": name, **cells, "right - left": difference})
     return rows
 
@@ -308,8 +304,7 @@ def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
     """List one coefficient of every stride with R² and residual of its fit, the flippers side by side."""
     rows: dict[tuple[int, int], dict[str, Any]] = {}
     for each in run.estimates[run.estimates["coefficient"] == name].itertuples():
-        text = value_text(each.value, each.std_error, per=N_CM3)
-        text = f"≥ {text}" if each.at_least else text
+        text = coefficient_text(each.value, each.std_error, at_least=each.at_least)
         row = rows.setdefault((each.walk, each.index), {"walk": each.walk, "stride": each.index})
         row[f"{each.flipper} (N/cm³)"] = text if each.valid or text == "-" else f"({text})"
         speed = f", {each.speed_m_s:.2g} m/s" * isfinite(each.speed_m_s)

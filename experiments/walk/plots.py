@@ -11,10 +11,11 @@ from pandas import DataFrame
 
 from control.records import COEFFICIENTS, Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
+from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES, line_of, looks_of
 from experiments.reports.text_tables import number
+from experiments.reports.value_text import N_CM3
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.stride_profile import profile_from, stroke_of
@@ -95,17 +96,17 @@ def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) ->
     """Draw the estimates by all methods; arrows are lower bounds, the dashed line the load cell's values."""
     valid = own[own["valid"].astype(bool)]
     tallest = own["truth"].max() if own["truth"].any() else valid["value"].max() if len(valid) else 1.0
-    top = HEADROOM * PER_CM3 * tallest
+    top = HEADROOM * tallest / N_CM3
     known = own[own["truth"].notna() & (own["method"] == DEFAULT)]
     look = {"color": GREY, "linewidth": 1.8, "label": "load cell"}
-    panel.plot(known["t_end_s"] - begun_s, PER_CM3 * known["truth"], "--", **look)
+    panel.plot(known["t_end_s"] - begun_s, known["truth"] / N_CM3, "--", **look)
     for method, style in METHOD_STYLES.items():
         rows = valid[valid["method"] == method]
         if method == COMPENSATED and name != "k_s":
             continue  # it compensates k_s alone
-        errors = 2.0 * PER_CM3 * rows["std_error"] * (method == DEFAULT)
+        errors = 2.0 / N_CM3 * rows["std_error"] * (method == DEFAULT)
         bounds = rows["at_least"].astype(bool)
-        values = (PER_CM3 * rows["value"]).clip(upper=0.97 * top)
+        values = (rows["value"] / N_CM3).clip(upper=0.97 * top)
         panel.errorbar(rows["t_end_s"] - begun_s, values, errors.mask(bounds, 0.1 * top), lolims=bounds,
                        linestyle="", linewidth=1.0, markersize=6.0, label=method, **style)  # fmt: skip
     panel.set(ylim=(0.0, top), ylabel=f"{LABELS[name]}\n(N/cm³)")
@@ -156,7 +157,7 @@ def _bar(
     """Return name, value, standard deviation of the trials, colour, text and hatch; a lower bound is hatched."""
     gathered = found if isinstance(found, GatheredCoefficient) else None
     value_n_m3 = gathered.value if gathered else found
-    value = PER_CM3 * value_n_m3 if isinstance(value_n_m3, float) else nan
+    value = value_n_m3 / N_CM3 if isinstance(value_n_m3, float) else nan
     bound = gathered is not None and gathered.at_least
     return (
         f"{label}\n{depth['depth_cm']:g} cm",

@@ -13,12 +13,12 @@ from scipy.stats import t as student_t
 
 from control.records import COEFFICIENTS
 from experiments.reports.coefficient_table import (
-    coefficient_text,
     compared_frame,
     compared_rows,
     error_table,
     error_text_table,
     gather_coefficient,
+    gathered_text,
     mud_table,
 )
 from experiments.robot.bench_errors import BenchError
@@ -60,7 +60,7 @@ def test_one_trial_has_the_error_of_its_own_estimate() -> None:
     reported = gather_coefficient([make_estimate(1e6, std_error=7e4)])
     assert (reported.value, reported.std_error) == (1e6, 7e4)
     assert reported.repeatability is reported.trials_error is reported.shared_error is None
-    assert coefficient_text(reported) == "1.000 ± 0.070"
+    assert gathered_text(reported) == "1.000 ± 0.070"
 
 
 def test_bounds_do_not_mix_with_values() -> None:
@@ -68,7 +68,7 @@ def test_bounds_do_not_mix_with_values() -> None:
     assert (mixed.value, mixed.at_least, mixed.bounds) == (1e6, False, 1)
     bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert (bounds.value, bounds.at_least, bounds.bounds, bounds.std_error) == (2e6, True, 3, None)
-    assert coefficient_text(bounds) == "≥ 2.000"
+    assert gathered_text(bounds) == "≥ 2.000"
 
 
 def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
@@ -103,7 +103,7 @@ def test_an_invalid_estimate_does_not_count_but_is_reported() -> None:
     assert (reported.value, reported.not_valid) == (1e6, ["too short"])
     nothing = gather_coefficient([make_estimate(None, reason="too short")])
     assert (nothing.value, nothing.std_error, nothing.trials) == (None, None, [])
-    assert coefficient_text(nothing) == "-"
+    assert gathered_text(nothing) == "-"
 
 
 # a load cell's file
