@@ -13,7 +13,6 @@ from experiments.flipper.modelled_force import modelled_stride
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
     GREY,
-    INK,
     LABELS,
     PHASE_NAMES,
     PHASE_SHADES,
@@ -28,39 +27,43 @@ from experiments.trials.stride_profile import profile_from, stroke_of
 
 Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
-DASHED: dict[str, Any] = THIN | {"linestyle": "--"}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
-STRIDE_PANELS = ("depth (cm)", "joint angle (°)", "$f_z$ up (N)", "$f_x$ forward (N)")
 
 
 def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
     stride = modelled_stride(trial, geometry, method)
     by_phase = {phase: stride.where(stride["phase"] == phase) for phase in PHASE_NAMES}
+    curves = {
+        "depth (cm)": {
+            "$z_c$ commanded": 100.0 * stride["depth_command_m"],
+            "$z$ actual": 100.0 * stride["depth_m"],
+        },
+        "joint angle (°)": {
+            "sweep $\\alpha$": np.degrees(stride["sweep_rad"]),
+            "adduction $\\beta$": np.degrees(stride["adduction_rad"]),
+        },
+        "$f_z$ up (N)": {
+            "$f_z$ measured": stride["force_z_n"].mask(stride["phase"] == Phase.STANCE),
+            "by $k_p$": by_phase[Phase.INSERTION]["law_z_n"],
+            "by $k_e$": by_phase[Phase.EXTRACTION]["law_z_n"],
+        },
+        "$f_x$ forward (N)": {"$f_x$ measured": stride["force_x_n"], "by $k_s$": stride["law_x_n"]},
+    }
     figure = Figure(figsize=(7.0, 8.2))
-    panels = figure.subplots(4, 1, sharex=True)
-    for number, values, colour, label, style in (
-        (0, 100.0 * stride["depth_command_m"], GREY, "$z_c$ commanded", DASHED),
-        (0, 100.0 * stride["depth_m"], INK, "$z$ actual", THIN),
-        (1, np.degrees(stride["sweep_rad"]), "tab:blue", "sweep $\\alpha$", THIN),
-        (1, np.degrees(stride["adduction_rad"]), "tab:red", "adduction $\\beta$", DASHED),
-        (2, stride["force_z_n"].mask(stride["phase"] == Phase.STANCE), "tab:green", "$f_z$ measured", THIN),
-        (2, by_phase[Phase.INSERTION]["law_z_n"], "tab:red", "by $k_p$", MODELLED),
-        (2, by_phase[Phase.EXTRACTION]["law_z_n"], "navy", "by $k_e$", MODELLED),
-        (3, stride["force_x_n"], "tab:blue", "$f_x$ measured", THIN),
-        (3, stride["law_x_n"], "tab:red", "by $k_s$", MODELLED),
-    ):
-        panels[number].plot(stride["time_s"], values, color=colour, label=label, **style)
+    panels = figure.subplots(len(curves), 1, sharex=True)
+    for letter, panel, (ylabel, lines) in zip(
+        "BCDE", panels, curves.items(), strict=True
+    ):  # the paper's A is a drawing
+        for label, values in lines.items():
+            panel.plot(stride["time_s"], values, label=label, **(MODELLED if label.startswith("by") else THIN))
+        panel.axhline(0.0, color=GREY, linewidth=0.6)
+        panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
+        panel.set_ylabel(ylabel)
+        panel.margins(x=0.0)
     surface_cm = 100.0 * (trial["strides"][method][0]["surface_m"] or 0.0)
     panels[0].axhline(surface_cm, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
     panels[0].invert_yaxis()
-    for panel in panels[2:]:
-        panel.axhline(0.0, color=GREY, linewidth=0.6)
-    for letter, panel, label in zip("BCDE", panels, STRIDE_PANELS, strict=True):  # the paper's A is a drawing
-        panel.set_ylabel(label)
-        panel.legend(ncols=3, loc="upper right", fontsize="small")
-        panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
-        panel.margins(x=0.0)
     for phase, name in PHASE_NAMES.items():
         times_s = by_phase[phase]["time_s"].dropna()
         if len(times_s):
@@ -68,6 +71,8 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
                 panel.axvspan(times_s.min(), times_s.max(), color=PHASE_SHADES[phase], linewidth=0.0, zorder=0)
             panels[0].annotate(name, (times_s.mean(), 1.02), xycoords=("data", "axes fraction"), ha="center",
                                va="bottom", fontsize="small")  # fmt: skip
+    for panel in panels:
+        panel.legend(ncols=3, loc="upper right", fontsize="small")
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     return figure
