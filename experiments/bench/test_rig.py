@@ -180,11 +180,9 @@ class TestRig:
         for _ in range(round(POLL_S / PERIOD_S)):
             self.tick()
 
-    def move(
-        self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None, law: HoldLaw | None = None
-    ) -> list[TickSample]:
+    def move(self, way_points: Sequence[JointAngles], speed_rad_s: float | None = None) -> list[TickSample]:
         """Move in HOLD along a smooth path to its end."""
-        self.controller.hold_law = law
+        self.controller.hold_law = None
         self.controller.follow_path(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
         return self.run_until(lambda sample: not self.controller.moving, 60.0, "The end of a path")
 

@@ -16,9 +16,9 @@ from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
 from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS, name_decades
+from experiments.reports.value_text import N_CM3
 
 COLOURS = dict(zip(COEFFICIENTS, ("tab:blue", "tab:red", "tab:green"), strict=True))
-PER_CM3 = 1e6  # N/m³
 WIDEST = 5.0  # standard deviations in the histogram; larger ones are drawn at its edge
 DODGE = 0.08  # between the trials of one stroke
 SMALL: dict[str, Any] = {"fontsize": "small"}
@@ -51,7 +51,7 @@ def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
         drawn = trial[trial["kind"] != "invalid"]
         x = drawn["stroke"] + 1 + DODGE * (number - (trials - 1) / 2.0)
         bounds = drawn["kind"] == "bound"  # an arrow upward
-        values, errors = drawn["value"] / PER_CM3, drawn["repeatability"] / PER_CM3
+        values, errors = drawn["value"] / N_CM3, drawn["repeatability"] / N_CM3
         panel.errorbar(x, values, errors, lolims=bounds, linewidth=1, capsize=2, **style)
 
 
@@ -95,7 +95,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
     if drawn.empty:
         return
     left, right, left_error, right_error = (
-        drawn[name] / PER_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")
+        drawn[name] / N_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")
     )
     colour = COLOURS[coefficient]
     panel.errorbar(left, right, right_error, left_error, fmt="o", color=colour, markersize=4, linewidth=1)
