@@ -72,7 +72,7 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
             panels[0].annotate(name, (times_s.mean(), 1.02), xycoords=("data", "axes fraction"), ha="center",
                                va="bottom", fontsize="small")  # fmt: skip
     for panel in panels:
-        panel.legend(ncols=3, loc="upper right", fontsize="small")
+        panel.legend(ncols=3, fontsize="small")
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     return figure

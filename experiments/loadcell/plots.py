@@ -13,7 +13,7 @@ from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, name_muds
 
-COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
+
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
 BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
@@ -27,7 +27,7 @@ def draw_mud(
     (vertical, shear), (depth, curve) = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     strokes = [trial for trial in trials if "k_p" in trial.strokes]
     for i, trial in enumerate(strokes):
-        look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
+        look = {"color": f"C{i}", "linewidth": 1.0}
         _plot_insertion((vertical, depth, curve), trial, look, f"trial {i + 1}")
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
@@ -35,7 +35,7 @@ def draw_mud(
     for i, (trial, stroke) in enumerate(drags):
         since_s = trial.profile.times_s - stroke.begin_s
         forces_n, shown = trial.profile.forces_n - trial.profile.zero_n, since_s > -BEFORE_S
-        look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
+        look = {"color": f"C{i}", "linewidth": 1.0}
         shear.plot(since_s[shown], forces_n[shown], label=f"trial {i + 1}", **look)
     if drags:
         stroke = drags[-1][1]
