@@ -13,7 +13,6 @@ from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, name_muds
 
-
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
 BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
