@@ -19,7 +19,7 @@ from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
-from experiments.actuator.file_change import FileChangeError, change_file
+from experiments.actuator.file_change import Changes, FileChangeError, change_file
 from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
@@ -67,7 +67,7 @@ def zero(
             status = exit_codes.REFUSED if sys.stdin.isatty() else exit_codes.USAGE
         return is_agreed
 
-    changes = {("drive", each.joint, "zero_turn"): each.new_turn for each in moved}
+    changes: Changes = {("drive", each.joint, "zero_turn"): each.new_turn for each in moved}
     try:
         print(change_file(config, text, changes, agrees))
     except FileChangeError as problem:

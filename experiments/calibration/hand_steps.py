@@ -105,7 +105,10 @@ class HandSteps:
             )
         if abs(turned_rad) < LEAST_TURN_RAD:
             least_deg = degrees(LEAST_TURN_RAD)
-            return f"{joint} turned by {degrees(abs(turned_rad)):.0f} degrees, which must be {least_deg:.0f} at least."
+            return (
+                f"{joint} turned by {degrees(abs(turned_rad)):.0f} degrees, which must be {least_deg:.0f} at least: turn it farther,"
+                " else check its encoder."
+            )
         return ""
 
     def _again(self, key: str, problem: str) -> Entry | None:
@@ -212,7 +215,7 @@ def check_hands(test_rig: TestRig) -> BenchReadings:
         front_deg, rear_deg = degrees(ends["front_rad"]), degrees(ends["rear_rad"])
         sign = f"it counts backward: change drive.{joint}.sign, and check its zero then"
         yield BenchReading(f"{joint}: turned forward or up", front_deg - rear_deg, "deg", 0.0, inf, sign)
-        narrow = f"the limit lies beyond the stop: narrow [limits], or {zero}"
+        narrow = f"the limit lies beyond the stop: narrow [limits], check the counts of a turn in the drive, or {zero}"
         yield BenchReading(f"{joint}: lower stop", rear_deg, "deg", -inf, degrees(span.min_rad), narrow)
         yield BenchReading(f"{joint}: upper stop", front_deg, "deg", degrees(span.max_rad), inf, narrow)
         scale, advice = ends["velocity_scale"], f"calibrate {joint}: its velocity has another scale than its angle"

@@ -46,7 +46,7 @@ def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> Non
         panel.plot(means.index, means, "o-" if is_number else "o", color=FORWARD)
     if not is_number:
         panel.set_xlim(-0.5, len(means) - 0.5)
-    elif min(x) > 0.0 and max(x) >= DECADE * min(x):
+    elif drawn["x"].min() > 0.0 and drawn["x"].max() >= DECADE * drawn["x"].min():
         panel.set_xscale("log")
         name_decades(panel.xaxis)
     panel.set_xlabel(key, fontsize="small")

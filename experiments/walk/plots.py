@@ -98,7 +98,7 @@ def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) ->
     tallest = own["truth"].max() if own["truth"].any() else valid["value"].max() if len(valid) else 1.0
     top = HEADROOM * tallest / N_CM3
     known = own[own["truth"].notna() & (own["method"] == DEFAULT)]
-    look = {"color": GREY, "linewidth": 1.8, "label": "load cell"}
+    look: dict[str, Any] = {"color": GREY, "linewidth": 1.8, "label": "load cell"}
     panel.plot(known["t_end_s"] - begun_s, known["truth"] / N_CM3, "--", **look)
     for method, style in METHOD_STYLES.items():
         rows = valid[valid["method"] == method]

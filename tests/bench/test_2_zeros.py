@@ -5,9 +5,9 @@ from experiments.calibration.hand_steps import check_hands
 from tests.bench.staged_bench import StagedBench
 
 
-def test_idle_flippers_lie_within_their_limits(bench: StagedBench) -> None:
-    bench.check(check_rest_pose)
-
-
 def test_hands_find_every_joint_as_it_is_configured(bench: StagedBench) -> None:
     bench.check(check_hands)
+
+
+def test_idle_flippers_lie_within_their_limits(bench: StagedBench) -> None:
+    bench.check(check_rest_pose)
