@@ -106,8 +106,8 @@ class HandSteps:
         if abs(turned_rad) < LEAST_TURN_RAD:
             least_deg = degrees(LEAST_TURN_RAD)
             return (
-                f"{joint} turned by {degrees(abs(turned_rad)):.0f} degrees, which must be {least_deg:.0f} at least: turn"
-                " it farther, else check its encoder."
+                f"{joint} turned by {degrees(abs(turned_rad)):.0f} degrees, which must be {least_deg:.0f} at least:"
+                " turn it farther, else check its encoder."
             )
         return ""
 

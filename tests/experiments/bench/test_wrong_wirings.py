@@ -185,7 +185,7 @@ WRONG: tuple[tuple[str, Rigs, str, str, str], ...] = (
     ("other direction", firmware05(encoder_direction=-1), "signs", "left_sweep follows other torques", "signs"),
     ("offset", drive("left_adduction", encoder_offset_rad=0.15), "zeros", "drive.left_adduction.zero_turn", "zeros"),
     ("limits", section("limits", sweep_max_deg=110.0), "zeros", "narrow [limits]", "zeros"),
-    ("other counts", firmware05(encoder_counts=4000), "currents", "encoder_counts = 8192", "signs"),
+    ("other counts", firmware05(encoder_counts=4000), "zeros", "counts of a turn", "zeros"),
     ("constant", joint("right_sweep", torque_constant_nm_a=0.1), "currents", "right_sweep.torque_const", "currents"),
     ("slow drive", drive("left_sweep", current_lag_s=0.006), "currents", "slow current loop", "currents"),
     ("repeater", others(Repeater()), "watchdogs", "another program that feeds it", "watchdogs"),
