@@ -35,7 +35,7 @@ WALK_S = 60.0
 STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it
 DEPTHS_M = (0.02, 0.025, 0.03, 0.035)
 PLAY_DEG = 1.0  # of belts between motors and joints
-GAINS_WITH_PLAY = JointGains(4.0, 0.033, 4.0, 0.033)  # of asked drives: 8 degrees of phase margin for a rotor alone
+GAINS_WITH_PLAY = JointGains(4.0, 0.033, 4.0, 0.033)  # 8 degrees of phase margin for a rotor alone, or more
 MOVE_RAD = 0.2
 BY_THE_MUD, BY_SINKING = ("flipper_stuck", "joint_not_following"), "following_error"
 
@@ -74,7 +74,7 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     track = Track([(100.0, Clay("drawn", chance.uniform(*STRENGTHS_PA)))], random_strength=strength)
     disturbances = replace(chance.choice((NONE, LAB)), play_deg=chance.choice((0.0, PLAY_DEG)))
     is_free = chance.random() < 0.5
-    if disturbances.play_deg and any(each.answers_only for each in configuration.drive.values()):
+    if disturbances.play_deg:
         configuration = replace(configuration, gains=GAINS_WITH_PLAY)
     plant = plant_of(configuration, disturbances, free_body=is_free)
     drives = drives_of(configuration, **drive_changes(disturbances))
