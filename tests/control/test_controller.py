@@ -190,17 +190,6 @@ def test_a_stop_on_the_path_to_the_front_raises_the_flippers_too() -> None:
     assert wanted_pose(controller, Mode.STOPPING) == pytest.approx(RAISED)
 
 
-def test_a_second_walk_starts_again_at_stride_zero() -> None:
-    controller = walking()
-    for _ in range(1000):
-        wanted_pose(controller, Mode.WALKING)
-    assert controller.target.stride == 1
-    wanted_pose(controller, Mode.STOPPING)
-    wanted_pose(controller, Mode.HOLD)
-    path_to_the_gait(controller)
-    assert (controller.target.stride, controller.target.phase) == (0, Phase.INSERTION)
-
-
 def test_outside_of_the_gait_the_target_is_at_rest() -> None:
     controller = ordered()
     for mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.HOLD):

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 
 from control.joint_friction import NO_FRICTION, SLOW_RAD_S, JointFriction
 
-DRY = JointFriction(coulomb_nm=0.02)
-
 angles = st.floats(-10.0, 10.0)
 velocities = st.floats(-50.0, 50.0)
 frictions = st.builds(
@@ -33,23 +31,6 @@ def test_friction_is_the_docstrings_sum(friction: JointFriction, angle: float, v
         + friction.cogging_nm * np.sin(friction.cogging_per_turn * angle + phase)
     )
     assert friction.torque_nm(angle, velocity) == pytest.approx(float(expected), abs=1e-9)
-
-
-def test_dry_friction_is_full_at_walking_speeds_and_antisymmetric() -> None:
-    for velocity in (0.3, 1.0, 10.0):
-        assert DRY.torque_nm(1.0, velocity) == pytest.approx(0.02, rel=1e-4)  # 1 - tanh 6 = 1e-5
-        assert DRY.torque_nm(1.0, -velocity) == -DRY.torque_nm(1.0, velocity)
-
-
-def test_dry_friction_of_a_joint_at_rest_points_nowhere() -> None:
-    assert DRY.torque_nm(1.0, 0.0) == 0.0
-    assert abs(DRY.torque_nm(1.0, 0.01 * SLOW_RAD_S)) < 0.011 * 0.02  # no jump there
-
-
-@given(velocities, angles)
-def test_friction_never_gives_a_joint_energy(velocity: float, angle: float) -> None:
-    friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
-    assert friction.torque_nm(angle, velocity) * velocity >= 0.0
 
 
 @pytest.mark.parametrize("field", ["coulomb_nm", "viscous_nm_s", "cogging_nm", "cogging_per_turn"])

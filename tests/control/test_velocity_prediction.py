@@ -4,7 +4,6 @@ import pytest
 
 from control.joint_pd import VelocityPrediction
 from control.parameters.arm_mass import ArmMass
-from control.parameters.joint_gains import JointGains
 from control.rate import PERIOD_S
 from control.records import DriveState, Joints, same_for_all
 
@@ -50,44 +49,3 @@ def test_nothing_is_predicted_from_a_repeated_answer_or_over_a_gap(gap_s: float)
     prediction.update(same_for_all(still), NONE)
     fast = still._replace(velocity_rad_s=3.0, angle_stamp_s=1.0 + gap_s)
     assert prediction.update(same_for_all(fast), same_for_all(0.5))[0].velocity_rad_s == 3.0
-
-
-def amplitude_rad_s(mud_nm_rad: float, joint: int, asked: bool, torques_known: bool) -> float:
-    """Return the speed, after 0.4 s, of a joint between springs without friction, whose torque is held for a tick."""
-    gains, prediction = JointGains(), VelocityPrediction((asked,) * 4, MASS)
-    stiffness_nm_rad = (gains.sweep_stiffness_nm_rad, gains.adduction_stiffness_nm_rad)[joint]
-    damping_nm_s_rad = (gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad)[joint]
-    inertia_kg_m2 = (MASS.sweep_inertia_kg_m2, MASS.adduction_inertia_kg_m2)[joint]
-    angle_rad, velocity_rad_s, torque_nm, fastest_rad_s = 0.0, 1.0, 0.0, 0.0
-    answer = DriveState(angle_rad, velocity_rad_s, angle_stamp_s=0.0)
-    for tick in range(1, 200):
-        sent_nm = same_for_all(torque_nm if torques_known else 0.0)
-        present = prediction.update(same_for_all(answer), sent_nm)[joint]
-        torque_nm = -stiffness_nm_rad * present.angle_rad - damping_nm_s_rad * present.velocity_rad_s
-        answer = DriveState(angle_rad, velocity_rad_s, angle_stamp_s=tick * PERIOD_S)
-        for _ in range(20):
-            velocity_rad_s += PERIOD_S / 20.0 * (torque_nm - mud_nm_rad * angle_rad) / inertia_kg_m2
-            angle_rad += PERIOD_S / 20.0 * velocity_rad_s
-        if tick > 150:
-            fastest_rad_s = max(fastest_rad_s, abs(velocity_rad_s))
-    return fastest_rad_s
-
-
-@pytest.mark.parametrize(
-    ("joint", "mud_nm_rad", "old_oscillates", "accelerated_oscillates"),
-    [
-        (0, 0.0, False, False),
-        (0, 20.0, True, False),
-        (0, 60.0, True, True),
-        (1, 0.0, False, False),
-        (1, 40.0, True, False),
-        (1, 95.0, True, True),  # clay of 9 kPa
-    ],
-)
-def test_answers_of_a_tick_ago_excite_a_joint_in_stiff_mud_only_without_prediction(
-    joint: int, mud_nm_rad: float, old_oscillates: bool, accelerated_oscillates: bool
-) -> None:
-    """The acceleration alone, without the known change of torque, is not enough in the stiffest mud."""
-    assert amplitude_rad_s(mud_nm_rad, joint, asked=True, torques_known=True) < 0.25
-    assert (amplitude_rad_s(mud_nm_rad, joint, asked=True, torques_known=False) > 1.0) is accelerated_oscillates
-    assert (amplitude_rad_s(mud_nm_rad, joint, asked=False, torques_known=True) > 1.0) is old_oscillates

@@ -1,16 +1,15 @@
-"""The choice of the next depth, against a search of every depth, and in synthetic clay."""
+"""The choice of the next depth, against a search of every depth."""
 
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, log, nan, radians
-from typing import NamedTuple
+from math import log, nan, radians
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import DepthAdaptation, DepthChoice
+from control.depth.depth_choice import DepthAdaptation, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, carried_m, motion_of
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
@@ -29,7 +28,6 @@ from tests.control.synthetic_muds import (
     lift_m4,
     reported,
     stride,
-    thrust_m3,
 )
 
 DEPTHS_M = [0.015 + 0.0025 * i for i in range(15)]
@@ -139,10 +137,6 @@ class TestTheFastestDepth:
         mud = estimated(SOFT, LOOSE)
         assert choose_now(adapted(burden), mud, both()).depth_m > chosen(mud).depth_m
 
-    def test_a_surface_that_lies_deeper_needs_a_deeper_stride(self) -> None:
-        level, sunk = (chosen(estimated(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
-        assert 0.0 < sunk.depth_m - level.depth_m <= 0.0075 + 1e-9
-
 
 class TestUnknownMud:
     @pytest.mark.parametrize(
@@ -177,11 +171,6 @@ class TestUnknownMud:
         adaptation.reset(0.02)
         assert adaptation.choice == DepthChoice(0.02, False, "start")
 
-    def test_a_stride_of_which_nothing_is_known_is_survived(self) -> None:
-        lost = stride(depth_m=nan, surface_m=nan)
-        assert chosen(estimated(FIRM), [lost, stride("right")]).depth_m == 0.015
-        assert chosen(NOTHING_KNOWN, [lost]).depth_m == PARAMETERS.initial_depth_m
-
 
 class TestUncertainty:
     """The muds are those through which the motors can pull the pad: beyond 1.5 N/cm³ its own drag exceeds their
@@ -211,11 +200,6 @@ class TestUncertainty:
         )
         assert uncertain.depth_m <= sure.depth_m
 
-    def test_mud_that_reads_softer_in_deeper_strides_is_walked_deeper(self) -> None:
-        depths_m = [chosen(estimated(reported(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
-        assert depths_m == sorted(depths_m)
-        assert depths_m[0] < depths_m[-1]
-
 
 SINKING = estimated(reported(0.08e6), LOOSE)  # the deeper, the faster
 
@@ -237,82 +221,6 @@ class TestStuck:
     ) -> None:
         strides = [stride(flipper, 0.04, released=flipper != stuck) for flipper in ("left", "right")]
         assert chosen(mud_estimate, strides, 0.04).depth_m == same_depth(0.0375)
-
-    @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
-    def test_a_stride_stuck_at_an_unknown_depth_leads_to_the_shallowest(self, reached_m: float) -> None:
-        assert chosen(SINKING, both(reached_m, released=False)).depth_m == 0.015
-
-
-class Clay(NamedTuple):
-    """Undrained clay: pressure min(3 + γ ζ/s_u + ζ/2w, 9) s_u across the plate, adhesion s_u/4 along it, 9 s_u
-    beneath.
-    """
-
-    strength_pa: float
-
-    def thrust_n(self, depth_m: float) -> float:
-        zeta = (np.arange(1000) + 0.5) / 1000.0 * depth_m
-        factor = np.minimum(3.0 + 17.5e3 * zeta / self.strength_pa + 0.5 * zeta / 0.025, 9.0)
-        return float(self.strength_pa * 0.025 * np.mean(factor) * depth_m)
-
-    def suction_n(self, depth_m: float) -> float:
-        edge_m2, around_m = 0.025 * 0.004, 2.0 * (0.025 + 0.004)
-        return self.strength_pa * (9.0 * edge_m2 + 0.25 * around_m * depth_m)
-
-    def k_s(self, depth_m: float) -> float:
-        """Return the k_s with which a plate straight out has the same thrust."""
-        return self.thrust_n(depth_m) / thrust_m3(depth_m)
-
-    def k_e(self, depth_m: float) -> float:
-        return self.suction_n(depth_m) / (0.025 * 0.004 * depth_m)
-
-    def mud_estimate(self) -> MudEstimate:
-        """Return the estimate that strides between 3 and 4 cm give."""
-        k_s, k_e = (
-            reported(k(0.035), depth_m=0.035, exponent=log(k(0.04) / k(0.03)) / log(4.0 / 3.0))
-            for k in (self.k_s, self.k_e)
-        )
-        return estimated(k_s, k_e)
-
-
-class TestMuds:
-    CLAYS = [Clay(strength_pa) for strength_pa in np.geomspace(300.0, 6000.0, 25)]
-
-    def test_the_softer_the_clay_the_deeper_the_stride(self) -> None:
-        """Above 3.7 kPa the motors are the limit at every depth, and a longer hold of the mud is worth more."""
-        depths_m = [chosen(clay.mud_estimate()).depth_m for clay in self.CLAYS if clay.strength_pa < 3.7e3]
-        assert depths_m == sorted(depths_m, reverse=True)
-        assert depths_m[0] == same_depth(0.05)
-        assert depths_m[-1] == same_depth(0.025)
-        assert len(set(depths_m)) >= 8
-        assert chosen(self.CLAYS[-1].mud_estimate()).depth_m == 0.015
-
-    def test_the_depth_is_nearly_the_best_by_the_clay_itself(self) -> None:
-        """The clay's law is no power of depth: strides of 3 to 4 cm predict 4 % too much thrust at 2 cm, and a step
-        that just carries the body loses up to 6 % by that. Clay in which every depth slips or sticks is left out.
-        """
-        for clay in self.CLAYS:
-            choice = chosen(clay.mud_estimate())
-            if choice.slips or choice.reason != "fastest":
-                continue
-            speeds = {}
-            for z in DEPTHS_M:
-                thrust_n = 2.0 * clay.thrust_n(z)
-                comes_out = clay.k_e(z) * lift_m4(z) < LIFTING_NM
-                speeds[z] = predicted_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
-            taken = next(speed for z, speed in speeds.items() if abs(z - choice.depth_m) < 1e-9)
-            assert taken > 0.94 * max(speeds.values())
-
-    @pytest.mark.parametrize("strength_pa", [500.0, 1500.0, 3000.0])
-    def test_the_choice_settles_where_the_strides_confirm_the_estimate(self, strength_pa: float) -> None:
-        adaptation, clay = adapted(), Clay(strength_pa)
-        depths_m = []
-        for _ in range(6):
-            depth_m = adaptation.choice.depth_m
-            depths_m.append(
-                choose_now(adaptation, clay.mud_estimate(), both(depth_m, extraction_nm=0.2), depth_m).depth_m
-            )
-        assert len(set(depths_m[1:])) == 1
 
 
 numbers = st.floats() | st.floats(-0.1, 0.1) | st.sampled_from([0.0, 0.03, 1e6])
@@ -346,7 +254,8 @@ class TestRange:
     ) -> None:
         parameters = AdaptationParameters(max_depth_m=max_depth_m)
         adaptation = DepthAdaptation(parameters, GEOMETRY, GaitParameters(sweep_angle_deg=sweep_deg))
-        assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in adaptation._depths_m)
+        grid_m = depth_grid(parameters, GEOMETRY, GaitParameters(sweep_angle_deg=sweep_deg))
+        assert all(GEOMETRY.is_reachable(radians(sweep_deg), depth_m) for depth_m in grid_m)
         adaptation.reset(parameters.min_depth_m)
         for mud_estimate, pair in walk:
             depth_m = choose_now(adaptation, mud_estimate, pair).depth_m
@@ -356,14 +265,10 @@ class TestRange:
         parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
         assert choose_now(adapted(parameters), estimated(FIRM, LOOSE), both()).depth_m == 0.15
 
-    def test_the_grid_contains_both_ends_of_its_range(self) -> None:
-        assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)
-        assert DEPTHS_M[-1] == same_depth(PARAMETERS.max_depth_m)
-
     @given(st.floats(0.01, 0.05), st.integers(0, 12), st.floats(0.01, 0.99))
     def test_the_grid_never_passes_its_greatest_depth(self, low_m: float, steps: int, fraction: float) -> None:
         high_m = low_m + (steps + fraction) * GRID_M
         assume(high_m < GEOMETRY.deepest_m(30.0))
-        grid_m = adapted(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m))._depths_m
+        grid_m = depth_grid(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m), GEOMETRY, GAIT)
         assert len(grid_m) == steps + 1
         assert grid_m[-1] <= high_m

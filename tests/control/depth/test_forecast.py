@@ -3,15 +3,13 @@
 The plate's sums over pieces of 0.25 by 0.05 mm are accurate to a thousandth (PIECES).
 """
 
-from math import log, nan, radians, sqrt
+from math import log, nan, sqrt
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from control.depth.forecast import THRUST_UNCERTAINTY, DepthForecast
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
-from control.records import Estimate, StrideEstimate
+from control.records import StrideEstimate
 from tests.control.synthetic_muds import (
     GAIT,
     GEOMETRY,
@@ -379,38 +377,3 @@ class TestPad:
     def test_it_is_none_where_there_is_no_pad_or_nothing_is_known(self) -> None:
         assert forecast(estimated(FIRM)).drag_shear(0.0) == 0.0
         assert forecast(NOTHING_KNOWN).drag_shear(0.02) == forecast(estimated(FIRM), []).drag_shear(0.02) == 0.0
-
-
-numbers = st.floats(allow_infinity=False) | st.floats(-0.5, 0.5) | st.sampled_from([0.0, 0.03, 1e6])
-estimates = st.builds(measured, numbers) | st.builds(
-    Estimate, numbers, numbers, st.just(9), st.booleans(), st.just(""), st.booleans()
-)
-coefficients = st.none() | st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
-flipper_estimates = st.builds(FlipperEstimate, *[coefficients] * 3)
-mud_estimates = st.builds(MudEstimate, *[coefficients] * 3, flipper_estimates, flipper_estimates, st.booleans())
-flippers = st.sampled_from(["left", "right"])
-strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates, estimates, numbers)
-
-
-@settings(max_examples=100)
-@given(
-    st.lists(st.tuples(mud_estimates, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
-    st.floats(0.005, 0.2),
-)
-def test_no_estimate_or_measurement_makes_it_raise(
-    walk: list[tuple[MudEstimate, list[StrideEstimate]]], depth_m: float
-) -> None:
-    survivor = new_forecast()
-    for mud_estimate, pair in walk:
-        survivor.update(mud_estimate, pair, depth_m)
-        survivor.yield_n(depth_m)
-        survivor.drag_shear(depth_m)
-        survivor.extraction_nm(depth_m)
-        assert 0.2 <= survivor.shear_ratio <= 1.5
-        assert 0.2 <= survivor.felt_fraction <= 1.5
-        assert depth_m <= survivor.reached_m(depth_m) or survivor.reached_m(depth_m) == GEOMETRY.deepest_m(30.0)
-
-
-def test_the_pose_of_the_extraction_is_the_rear_of_the_sweep() -> None:
-    assert new_forecast().rear_rad == -radians(30.0)
-    assert new_forecast().lifting_torque_nm == pytest.approx(LIFTING_NM)

@@ -85,7 +85,7 @@ def brute_force(
     return sorted(found, reverse=True)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25)
 @given(
     walked_deg=st.sampled_from([30.0, 40.0, 50.0]),
     k_s=st.floats(0.15e6, 3e6),
@@ -227,7 +227,7 @@ def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken_and_witho
     assert choice.depth_m == pytest.approx(0.05)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15)
 @given(k_s=st.floats(1e4, 1e7), k_e=st.floats(1e4, 1e7), seed=st.integers(0, 7))
 def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
     adaptation = adapted()

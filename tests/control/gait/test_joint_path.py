@@ -45,11 +45,6 @@ def test_a_path_leads_to_its_last_point_in_its_longest_legs_over_the_speed_and_s
         assert max(moved) <= 2.0 * speed * PERIOD_S * (1.0 + 1e-9)
 
 
-@given(poses, speeds)
-def test_a_leg_of_zero_length_moves_nothing(pose: JointAngles, speed: float) -> None:
-    assert set(walked(JointPath(pose, [pose, pose], speed))) == {still(pose)}
-
-
 def test_way_points_are_passed_one_after_the_other() -> None:
     raised, front = Joints(0.4, 0.0, 0.4, 0.0), Joints(0.5, 0.0, 0.5, 0.0)
     steps = walked(JointPath(Joints(0.4, -0.6, 0.4, -0.6), [raised, front], 1.0))
@@ -58,17 +53,6 @@ def test_way_points_are_passed_one_after_the_other() -> None:
     assert steps == lifting + sweeping
     assert all(step[1].angle_rad < 0.0 for step in lifting[:-1])
     assert all(step[1].angle_rad == 0.0 for step in sweeping)
-
-
-def test_velocities_are_the_derivatives_of_the_angles() -> None:
-    path, dt = JointPath(Joints(0.0, -0.6, 0.2, 0.4), [Joints(0.5, 0.0, 0.1, 0.4)], 1.0), 1e-4
-    steps = []
-    while not path.finished:
-        steps.append(path.step(dt))
-    for before, now, after in zip(steps, steps[1:], steps[2:], strict=False):
-        for joint in range(4):
-            slope = (after[joint].angle_rad - before[joint].angle_rad) / (2.0 * dt)
-            assert now[joint].velocity_rad_s == pytest.approx(slope, abs=1e-3)
 
 
 def test_a_path_without_points_is_finished_at_once() -> None:

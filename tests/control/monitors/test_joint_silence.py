@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.faults import FAULT_KINDS, Reaction
-from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from control.records import NEVER_S
 from tests.control.monitors.monitored_joint import BOUNDS, NOW_S, faults_of, healthy, make_monitor, names_of
@@ -32,25 +31,6 @@ SEVERITY = [
 
 def stamped(signals: tuple[str, ...], stamp_s: float) -> dict[str, Any]:
     return {f"{signal}_stamp_s": stamp_s for signal in signals}
-
-
-def test_the_default_bounds_are_those_that_the_reference_publishes() -> None:
-    """The times of a few ticks are 2, 3, 10, 3, 5 and 4 periods of the loop; the others suit a machine of this size."""
-    assert FaultBounds() == FaultBounds(
-        late_s=0.0053,
-        quiet_s=0.0079,
-        silence_s=0.0263,
-        jump_rad=0.05,
-        fast_s=0.0079,
-        lag_s=0.0131,
-        crawl_s=0.0105,
-        lag_fraction=0.1,
-        longest_watchdog_s=0.3,
-        voltage_low_v=20.0,
-        voltage_min_v=18.0,
-        disk_free_fraction=0.05,
-        disk_slow_s=2.0,
-    )
 
 
 @pytest.mark.parametrize(
