@@ -181,15 +181,9 @@ def test_phases_in_any_order_leave_the_next_good_stride_as_it_is(method: Method)
 
 
 anything = st.floats()
-rows_of_anything = st.tuples(anything, st.sampled_from(Phase), anything, anything, anything, anything)
 
 
-@given(st.lists(rows_of_anything, max_size=60), st.sampled_from(METHODS))
-def test_nothing_makes_the_estimator_raise(rows: list[Row], method: Method) -> None:
-    fed(new_estimator(method), rows)
-
-
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(st.lists(anything, min_size=1, max_size=30), st.sampled_from(METHODS))
 def test_no_currents_make_a_good_walk_raise(currents_a: list[float], method: Method) -> None:
     """Every stroke closes here, which random rows hardly ever achieve."""
@@ -197,23 +191,3 @@ def test_no_currents_make_a_good_walk_raise(currents_a: list[float], method: Met
         (*row[:4], currents_a[i % len(currents_a)], currents_a[-i % len(currents_a)]) for i, row in enumerate(walk())
     ]
     assert_all_consistent(fed(new_estimator(method), rows))
-
-
-modest = st.floats(-1.5, 1.5) | st.just(nan)
-modest_rows = st.tuples(st.floats(0.0, 10.0), st.sampled_from(Phase), modest, modest, st.floats(-20, 20), modest)
-
-
-@given(st.lists(modest_rows, max_size=60), st.sampled_from(METHODS))
-def test_modest_nonsense_never_gives_an_inconsistent_estimate(rows: list[Row], method: Method) -> None:
-    assert_all_consistent(fed(new_estimator(method), sorted(rows, key=lambda row: row[0])))
-
-
-@given(st.lists(st.floats(), min_size=13, max_size=13), st.sampled_from(Phase), st.sampled_from(METHODS))
-def test_velocities_and_poses_of_any_value_are_survived(values: list[float], phase: Phase, method: Method) -> None:
-    mud = new_estimator(method)
-    a, b, c, d = values[:4]
-    for now_s, stroke in ((values[12], phase), (1.0, Phase.STANCE), (1.0, Phase.EXTRACTION), (2.0, Phase.SWING)):
-        first = recorded_states(now_s, (0.1, 0.2, 0.3, 0.4), (a, b, c, d), values[4:8])
-        second = recorded_states(now_s, (0.1, 0.2, 0.3, 0.5), (d, c, b, a), (values[8], values[9], 0.0, 0.0))
-        mud.update(now_s, stroke, first, BodyPose(now_s, a))
-        mud.update(now_s, stroke, second, BodyPose(now_s, values[11]))

@@ -27,7 +27,6 @@ from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive
 from estimation.stride_estimator import GRACE_S
 from estimation.strokes.shear import Base
-from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
 from firmware_host.configuration.gait_file import PROTOCOLS
 from tests.estimation import synthetic_strides
 from tests.estimation.synthetic_strides import GEOMETRY, RATE_HZ, Moment, Row, strides_of, update, walked
@@ -135,16 +134,13 @@ def ratios(stride: StrideEstimate, mud: Mud) -> list[float]:
     return [each.value / truth for each, truth in zip(coefficients(stride), mud[:3], strict=True)]
 
 
-def uncertainties(stride: StrideEstimate) -> list[float]:
-    return [each.std_error / each.value for each in coefficients(stride)]
-
-
 # the laws are found
 
 
 @pytest.mark.parametrize("drive", [WEIGHTLESS, HEAVY])
-@pytest.mark.parametrize("gait", [GAIT, PROTOCOLS["single_flipper"]])
-@pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04])
+@pytest.mark.parametrize(
+    ("depth_m", "gait"), [(0.02, PROTOCOLS["single_flipper"]), (0.03, GAIT), (0.04, PROTOCOLS["single_flipper"])]
+)
 def test_where_the_surface_is_known_shear_and_extraction_are_found(
     depth_m: float, gait: GaitParameters, drive: FlipperDrive
 ) -> None:
@@ -161,7 +157,7 @@ def test_where_the_surface_is_known_shear_and_extraction_are_found(
 
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize(
-    ("factor", "depth_m"), [(1.0, 0.04), *((f, z) for f in (0.4, 1.0, 3.0) for z in (0.02, 0.025, 0.03))]
+    ("factor", "depth_m"), [(1.0, 0.04), (0.4, 0.02), (0.4, 0.03), (1.0, 0.025), (3.0, 0.02), (3.0, 0.03)]
 )
 def test_without_prior_knowledge_and_noise_all_error_is_that_of_the_surface(
     factor: float, depth_m: float, surface_m: float
@@ -182,40 +178,6 @@ def test_without_prior_knowledge_and_noise_all_error_is_that_of_the_surface(
         assert ratios(stride, mud) == pytest.approx([1.0, 1.0, 1.0], abs=0.06)
     for ratio, power, tolerance in zip(ratios(stride, mud), (1.5, 2.0, 1.5), (0.01, 0.003, 0.03), strict=True):
         assert ratio * (1.0 - late) ** power == pytest.approx(1.0, abs=tolerance)
-
-
-@pytest.mark.parametrize("factor", [-1.0, 0.0])
-def test_mud_that_pushes_along_the_motion_has_no_coefficient(factor: float) -> None:
-    for each in coefficients(one(noisy(rows_of(motion(), MUD.times(factor)), 1, 0.01))):
-        assert not each.valid
-        assert each.reason
-
-
-@pytest.mark.parametrize("face_fraction", [-0.3, 0.15, 0.3])
-def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_fraction: float) -> None:
-    """Uncorrected, a face load of -30 % to 30 % of the stance's load would change k_p and k_e by up to 14 %. It blurs
-    the depth at which the force begins to rise by a few tenths of a millimetre, which the uncertainty covers.
-    """
-    plain, faced = (
-        one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=0.05))
-        for fraction in (0.0, face_fraction)
-    )
-    assert faced.k_p.value == pytest.approx(MUD.k_p, abs=2.0 * faced.k_p.std_error)
-    late = [(each.surface_m / each.depth_m) for each in (plain, faced)]
-    corrected = [each.k_p.value * (1.0 - fraction) ** 1.5 for each, fraction in zip((plain, faced), late, strict=True)]
-    assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference remains
-
-
-def test_at_five_centimetres_and_thirty_degrees_the_upper_part_is_observed() -> None:
-    """The arm hangs so steeply that its adduction joint has a lever of only 14 mm. Both k_p and k_e come from the poses
-    in which the lever is longer.
-    """
-    front_rad = radians(30.0)
-    assert GEOMETRY.vertical_lever_m(front_rad, GEOMETRY.adduction_rad(front_rad, 0.05)) < MIN_VERTICAL_LEVER_M
-    stride = one(rows_of(motion(0.05)), estimator(surface_error_m=KNOWN_M))
-    assert all(each.valid for each in coefficients(stride))
-    assert ratios(stride, MUD)[1:] == pytest.approx([1.0, 1.0], abs=0.01)  # as at smaller depths
-    assert abs(stride.k_p.value - MUD.k_p) < 2.0 * stride.k_p.std_error  # the bend at the steep end leaves a level
 
 
 # the zero
@@ -263,7 +225,7 @@ def test_without_air_before_it_the_insertion_itself_gives_the_zero() -> None:
 # messages: repeated, seldom, lost, wild
 
 
-@pytest.mark.parametrize("times", [2, 3, 10])
+@pytest.mark.parametrize("times", [2, 7])
 def test_rows_that_repeat_change_neither_value_nor_uncertainty(times: int) -> None:
     """Only the time at which a batch ends may change, and only the batch's speed shows it."""
     rows = noisy(rows_of(motion(), MUD, HEAVY), 3)
@@ -274,7 +236,7 @@ def test_rows_that_repeat_change_neither_value_nor_uncertainty(times: int) -> No
         assert b == a
 
 
-@pytest.mark.parametrize("ticks", [2, 4, 10])
+@pytest.mark.parametrize("ticks", [3, 10])
 def test_slow_messages_change_value_and_error_little(ticks: int) -> None:
     """The messages come 190 to 38 times a second. A tenth of the messages has √10 of the noise; with 0.02 A that is
     negligible compared with the torque constants' 3.2 %.
@@ -287,7 +249,7 @@ def test_slow_messages_change_value_and_error_little(ticks: int) -> None:
         assert b.std_error == pytest.approx(a.std_error, rel=0.5)
 
 
-@pytest.mark.parametrize("bad", [nan, inf, -inf])
+@pytest.mark.parametrize("bad", [nan, inf])
 @pytest.mark.parametrize("joint", ["sweep", "adduction"])
 @pytest.mark.parametrize("field", ["angle_rad", "current_a"])
 def test_samples_that_are_not_finite_are_skipped(joint: str, field: str, bad: float) -> None:
@@ -328,7 +290,7 @@ def test_one_wild_sample_moves_no_coefficient_out_of_its_interval(phase: Phase, 
     """
     rows = noisy(rows_of(motion(gait=PROTOCOLS["single_flipper"])), 4)
     calm = one(rows)
-    for index in [i for i, row in enumerate(rows) if row.phase is phase][3::29]:
+    for index in [i for i, row in enumerate(rows) if row.phase is phase][3::89]:
         wild = one([*rows[:index], rows[index].pushed(wild_a, wild_a), *rows[index + 1 :]])
         for a, b in zip(coefficients(calm), coefficients(wild), strict=True):
             assert abs(b.value - a.value) < 1.96 * b.std_error
@@ -350,13 +312,13 @@ def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
 
 
 def test_the_interval_of_95_percent_covers_the_truth_about_that_often() -> None:
-    """A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; intervals half as wide as they should be would read
+    """A true 95 % would read 90 to 99 % in 49 of 50 such tests; intervals half as wide as they should be would read
     68 %, and of intervals twice as wide the errors would fill a half.
     """
-    reported = [drawn(seed) for seed in range(300)]
+    reported = [drawn(seed) for seed in range(120)]
     for index in range(3):
         pairs = [(coefficients(stride)[index], mud[index]) for mud, stride in reported]
-        assert sum(each.valid for each, _ in pairs) >= 297
+        assert sum(each.valid for each, _ in pairs) >= 119
         hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
         assert np.mean(hits) >= 0.9
         spread = np.std([(each.value / truth - 1.0) * each.value / each.std_error for each, truth in pairs])
@@ -377,35 +339,6 @@ def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
 
 
 # motors at their limit, bodies that move
-
-
-def stuck(at_rad: float) -> list[Moment]:
-    """Return a motion whose sweep stops at `at_rad` for the rest of the stance and rises from there."""
-    moments = []
-    for moment in motion():
-        if moment.sweep_rad < at_rad and moment.phase in (Phase.STANCE, Phase.EXTRACTION):
-            depth_m = moment.depth_m
-            moment = moment._replace(sweep_rad=at_rad, sweep_rad_s=0.0)
-            moment = moment._replace(adduction_rad=GEOMETRY.adduction_rad(at_rad, depth_m))
-        moments.append(moment)
-    return moments
-
-
-@pytest.mark.parametrize("base", [Base.FIXED, Base.FREE])
-def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_strength(base: Base) -> None:
-    """The mud could withstand more than this motor gives, 1.7 N·m on 150 cm⁴ of Ψ at 10 degrees."""
-    limit_a, at_rad = 20.0, radians(10.0)
-    rows = [
-        row._replace(sweep=row.sweep._replace(current_a=max(row.sweep.current_a, -limit_a)))
-        for row in noisy(rows_of(stuck(at_rad), MUD._replace(k_s=2.0e6)), 1, 0.01)
-    ]
-    stride = one(rows, estimator(WEIGHTLESS._replace(current_limit_a=limit_a), base=base))
-    assert (stride.stance, stride.k_s.reason) == ("limited_by_motor", "a motor at its limit")
-    assert stride.k_s.at_least and stride.k_s.valid
-    plate = submerged_plate(GEOMETRY, at_rad, GEOMETRY.adduction_rad(at_rad, 0.03))
-    assert stride.k_s.value == pytest.approx(limit_a * 0.083 / stance_moment_m4(GEOMETRY, plate), rel=0.02)
-    unlimited = one(rows, estimator(WEIGHTLESS._replace(current_limit_a=50.0), base=Base.FIXED))
-    assert unlimited.stance == "limited_by_body"
 
 
 def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
@@ -457,21 +390,7 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
             assert load.sweep_torque_nm == pytest.approx(sweep_nm, abs=0.01)
             assert load.adduction_torque_nm == pytest.approx(adduction_nm, abs=0.01 + mud.friction_nm)  # of any sign
             assert load.depth_m == pytest.approx(row.depth_m, abs=1e-4)
-
-
-def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_reported() -> None:
-    """The pose is half-way between two samples."""
-    flipper, rows = estimator(), rows_of(motion())[:-1]
-    loads = [update(flipper, *row)[0] for row in rows]
-    for before, row, load in zip(rows, rows[1:], loads[1:], strict=False):
-        sweep_rad = (before.sweep.angle_rad + row.sweep.angle_rad) / 2.0
-        lift_rad = (before.adduction.angle_rad + row.adduction.angle_rad) / 2.0
-        force_n = smallest_force_n(GEOMETRY, sweep_rad, lift_rad, load.sweep_torque_nm, load.adduction_torque_nm)
-        assert load.force_x_n == pytest.approx(force_n[0], abs=1e-9)
-        if row.phase is Phase.STANCE:
-            assert not isfinite(load.force_z_n)
-        else:
-            assert load.force_z_n == pytest.approx(force_n[1], abs=1e-9)
+            assert not isfinite(load.force_z_n)  # in stance no upward force is reported
 
 
 def test_the_largest_forces_of_the_stride_are_reported() -> None:
@@ -575,23 +494,7 @@ def test_a_recovery_does_not_shift_the_zero() -> None:
     assert second.tare_n == pytest.approx(plain.tare_n, abs=1e-3)
 
 
-def test_a_flipper_that_stays_down_gives_only_a_lower_bound() -> None:
-    """The tolerance of 5 % covers a batch of 33 samples whose first one is half in stance."""
-    stride = one(noisy(waiting(rows_of(lifted_to(0.03))), 1, 0.01), estimator(surface_error_m=KNOWN_M))
-    assert not stride.released
-    assert (stride.k_e.at_least, stride.k_e.reason) == (True, NOT_OUT)
-    assert stride.k_e.value == pytest.approx(MUD.k_e, rel=0.05)
-    assert stride.k_p.valid and stride.k_s.valid
-
-
 # memory
-
-
-def test_each_stride_of_a_walk_gives_the_same() -> None:
-    strides = closed(rows_of(motion(strides=3)))
-    assert [stride.index for stride in strides] == [0, 1, 2]
-    for stride in strides[1:]:  # ticks fall differently into each: up to one of the 26 in a batch
-        assert ratios(stride, MUD) == pytest.approx(ratios(strides[0], MUD), rel=0.02)
 
 
 def test_a_reset_forgets_stride_zero_and_count() -> None:

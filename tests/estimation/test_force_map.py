@@ -28,17 +28,6 @@ def test_the_force_is_the_papers_matrix_times_the_torques(
     assert force == pytest.approx(tuple(matrix @ [sweep_nm, adduction_nm]), abs=1e-12)
 
 
-@given(angles, angles, st.floats(-10.0, 10.0))
-def test_the_map_gives_exactly_the_forward_part_of_a_force_normal_to_the_plate(
-    sweep: float, adduction: float, normal_n: float
-) -> None:
-    jacobian = FlipperGeometry(0.12, 0.0, 0.03).jacobian(sweep, adduction)
-    ca, sa, cb, sb = np.cos(sweep), np.sin(sweep), np.cos(adduction), np.sin(adduction)
-    force = normal_n * np.array([ca, -sa * cb, -sa * sb])
-    sweep_nm, adduction_nm = (np.reshape(jacobian, (3, 2)).T @ force).tolist()
-    assert paper_force_n(sweep, adduction, sweep_nm, adduction_nm, 0.12)[0] == pytest.approx(force[0], abs=1e-12)
-
-
 geometries = st.builds(
     FlipperGeometry, flipper_length_m=st.floats(0.05, 1.0), drop_m=st.floats(0.0, 0.5), axis_height_m=st.just(0.06)
 )

@@ -219,48 +219,6 @@ def test_the_current_is_that_of_the_moment_between_the_angles(
     assert motion_between(before, now, commands_s)[3] == pytest.approx(current_a)
 
 
-MUD_NM = -0.1
-
-
-def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
-    """Return the loads of an adduction joint against mud, without gravity, whose motor changes its torque in every tick
-    by up to 0.5 N·m, as in the extraction of a walk. The motion is exact: the acceleration is constant within a tick.
-    `known` states whether the estimator gets the times of the commands.
-    """
-    torques_nm = np.random.default_rng(1).uniform(-0.25, 0.25, 400)
-    drive = DRIVE._replace(mass=ArmMass(0.0, 0.0, 0.0004, 0.0006))
-    times_s = PERIOD_S * np.arange(401)
-    speeds_rad_s = np.concatenate([[0.0], np.cumsum(PERIOD_S * (torques_nm + MUD_NM) / 0.0006)])
-    angles_rad = np.concatenate([[0.0], np.cumsum(PERIOD_S * (speeds_rad_s[:-1] + speeds_rad_s[1:]) / 2.0)])
-    loads, reported = JointLoads(GEOMETRY, drive), list[float]()
-    for tick in range(5, 400):
-        now_s = float(times_s[tick])
-        angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
-        index = int(current_s / PERIOD_S)
-        sample = DriveState(
-            angle_rad=float(np.interp(angle_s, times_s, angles_rad)),
-            velocity_rad_s=float(np.interp(angle_s, times_s, speeds_rad_s)),
-            angle_stamp_s=angle_s,
-            current_a=float(torques_nm[index]) / LIFT_NM_A,
-            current_stamp_s=current_s,
-        )
-        commands_s = (float(times_s[tick - 2]), float(times_s[tick - 1])) if known else NO_COMMANDS
-        load = loads.update(DriveState(0.0, 0.0, angle_s, 0.0, current_s), sample, commands_s)
-        if load is not None and tick > 10:
-            reported.append(load.adduction_nm)
-    return reported
-
-
-def test_a_load_is_found_under_torques_that_are_held_from_tick_to_tick() -> None:
-    """Messages every millisecond determine the load exactly. Messages every second millisecond leave an error where
-    four milliseconds without a message reach back beyond the last two commands, into 0.7 ms of a third one.
-    """
-    assert np.abs(np.array(loads_of_a_driven_arm(0.001, known=True)) - MUD_NM).max() < 1e-9
-    errors_nm = np.array(loads_of_a_driven_arm(0.002, known=True)) - MUD_NM
-    assert np.abs(errors_nm).max() < 0.1
-    assert np.sqrt(np.mean(errors_nm**2)) < 0.03
-
-
 def test_two_samples_of_one_moment_give_no_acceleration() -> None:
     for motion in (motion_between, motion_at):
         assert motion(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0)) == (0.3, 3.0, 0.0, 4.0)

@@ -198,7 +198,7 @@ def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope_whic
 def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
     samples = triggered(walked(), MUD)
     scores = []
-    for seed in range(60):
+    for seed in range(30):
         stride = one(noisy(samples, seed, 0.1))
         found = ((stride.k_p, MUD.k_p), (stride.k_s, MUD.k_s), (stride.k_e, MUD.k_e))
         scores.append([(estimate.value - truth) / estimate.std_error for estimate, truth in found])

@@ -58,16 +58,16 @@ def test_the_other_surface_is_the_mean_of_the_other_finds(fixed_base: bool) -> N
 
 
 @BASES
-@pytest.mark.parametrize("count", [4, 6, 8])
+@pytest.mark.parametrize("count", [4, 8])
 @pytest.mark.parametrize(("apart_m", "least", "most"), [(0.0, 0.0, 0.04), (0.006, 0.88, 1.0), (0.009, 0.98, 1.0)])
 def test_two_surfaces_are_found_as_often_as_predicted(
     count: int, apart_m: float, least: float, most: float, fixed_base: bool
 ) -> None:
     random, hits = np.random.default_rng(count), 0
-    for _ in range(400):
+    for _ in range(150):
         depths_m = ERROR_M * random.standard_normal(count) + apart_m * (np.arange(count) % 2)
         hits += bool(np.isfinite(others_m(depths_m.tolist(), fixed_base)[-1]))
-    assert least <= hits / 400 <= most
+    assert least <= hits / 150 <= most
 
 
 def test_one_outlier_is_no_second_surface() -> None:

@@ -76,14 +76,6 @@ def test_the_slope_is_statsmodels_huber_fit(clip: float, monkeypatch: pytest.Mon
     assert clipped > 30  # otherwise this would be least squares
 
 
-@given(st.integers(0, 10**6), st.integers(MIN_BATCHES, 60))
-def test_without_outliers_the_slope_is_numpys_least_squares(seed: int, count: int) -> None:
-    x, y = noisy(seed, count, 0.0)
-    y += 0.1 * np.resize([1.0, -1.0], count)  # residuals of about equal size: nothing is clipped
-    solution = np.linalg.lstsq(x[:, None], y)[0]
-    assert fitted(x, y).slope == pytest.approx(float(solution[0]), rel=1e-12)
-
-
 # wild batches
 
 
@@ -139,7 +131,7 @@ def autocorrelated(seed: int, count: int, correlation: float) -> tuple[Array, Ar
     return x, K * x + 0.1 * noise[60:]
 
 
-def coverage(count: int, correlation: float, runs: int = 800) -> float:
+def coverage(count: int, correlation: float, runs: int = 400) -> float:
     """Return the fraction of strokes whose true coefficient lies within two standard errors."""
     fits = [fitted(*autocorrelated(seed, count, correlation)) for seed in range(runs)]
     return sum(abs(fit.slope - K) <= 2.0 * fit.std_error for fit in fits) / runs
@@ -147,7 +139,7 @@ def coverage(count: int, correlation: float, runs: int = 800) -> float:
 
 @pytest.mark.parametrize("count", [5, 8, 12, 20, 40])
 def test_two_standard_errors_cover_independent_noise_95_times_in_a_hundred_however_short_the_stroke(count: int) -> None:
-    """The limits allow four sampling errors of 800 runs to either side, and up to 2 % more since the larger error is
+    """The limits allow three sampling errors of 400 runs to either side, and up to 2 % more since the larger error is
     used.
     """
     assert 0.92 <= coverage(count, 0.0) <= 0.985

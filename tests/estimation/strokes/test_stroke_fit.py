@@ -211,15 +211,6 @@ def test_a_fraction_of_the_cross_coupling_stays_uncertain(face_nm: float) -> Non
     assert reported == pytest.approx(CROSS_COUPLING_UNCERTAINTY * abs(unfelt / K - 1.0), rel=1e-3)
 
 
-def test_scatter_of_the_batches_adds_to_the_uncertainty() -> None:
-    random = np.random.default_rng(1)
-    uncertainties = []
-    for noise_nm in (0.005, 0.02):
-        noisy = [b._replace(adduction_nm=b.adduction_nm + float(random.normal(0.0, noise_nm))) for b in down()]
-        uncertainties.append(systematic(insertion(noisy)))
-    assert 0.002 < uncertainties[0] < uncertainties[1] < 0.05
-
-
 # invalid coefficients
 
 

@@ -48,7 +48,7 @@ class Scores(NamedTuple):
 
 
 @cache
-def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 400) -> Scores:
+def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 200) -> Scores:
     """Return the errors over many insertions into mud whose force is a jump plus a slope."""
     errors_mm, reported_mm, covered, of_k = [], 0.0, 0, []
     for seed in range(runs):
@@ -88,7 +88,7 @@ def test_k_law_mud_of_any_slope_has_little_bias(slope_n_cm: float, table_sd: flo
     ("noise_n", "count"), [(REFERENCE_NOISE_N, REFERENCE_COUNT), (BATCH_NOISE_N, BATCH_COUNT)], ids=["rows", "batches"]
 )
 def test_two_standard_errors_cover_the_surface_of_k_law_mud(slope_n_cm: float, noise_n: float, count: int) -> None:
-    """The measured coverage is 93 to 98 %, three sampling errors of 400 runs are 4 %. The errors are no larger than a
+    """The measured coverage is 93 to 98 %, three sampling errors of 200 runs are 5 %. The errors are no larger than a
     kink and a jump in the same gap between two batches require, 1.0 to 1.5 times the scatter in this mud: they also
     allow for the jump, which this mud never has. (The best border alone scattered more: 0.9 to 1.3 times.)
     """
@@ -128,18 +128,18 @@ def test_the_level_errs_by_its_standard_error(slope_n_m: float, jump_n: float) -
     information.
     """
     errors_n, reported_n = [], 0.0
-    for seed in range(400):
+    for seed in range(150):
         z = depths(seed)
         surface = found(z, np.where(z > 0.0, jump_n + slope_n_m * z, 0.0) + BATCH_NOISE_N * noise(seed, len(z)))
         errors_n.append(surface.level_n)
-        reported_n += surface.level_std_error_n / 400.0
+        reported_n += surface.level_std_error_n / 150.0
     assert reported_n == pytest.approx(BATCH_NOISE_N / sqrt(9.7), rel=0.15)
     assert np.std(errors_n) == pytest.approx(reported_n, rel=0.15)
 
 
 def test_shapes_that_disagree_add_to_the_uncertainty() -> None:
     """Where a jump and a kink two millimetres apart fit equally well, the uncertainty is larger than that of either."""
-    reported_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).reported_mm for jump_n in (0.0, 0.2, 1.0)]
+    reported_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT).reported_mm for jump_n in (0.0, 0.2, 1.0)]
     assert reported_mm[1] > 1.3 * max(reported_mm[0], reported_mm[2])
 
 
@@ -150,7 +150,7 @@ def test_shapes_that_disagree_add_to_the_uncertainty() -> None:
 def test_mud_that_jumps_begins_at_the_jump(jump_n: float, slope_n_m: float) -> None:
     """The border is uniformly distributed within one batch, with an sd of 1.5 mm/√12."""
     step_mm = 1000.0 * BELOW_M / BATCH_COUNT
-    result = scores(slope_n_m or 1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200)
+    result = scores(slope_n_m or 1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT)
     assert np.mean(result.errors_mm) == pytest.approx(0.0, abs=0.1 * step_mm)
     assert np.std(result.errors_mm) == pytest.approx(step_mm / sqrt(12.0), rel=0.15)
     assert result.covered >= 0.99  # a uniform distribution ends at √3 of its standard deviations
@@ -164,10 +164,10 @@ def test_mud_that_jumps_begins_at_the_jump(jump_n: float, slope_n_m: float) -> N
 def test_noise_alone_is_no_mud(level_n: float) -> None:
     """At most one insertion through air in a hundred gives a false alarm."""
     alarms = 0
-    for seed in range(300):
+    for seed in range(100):
         z = depths(seed)
         alarms += found(z, level_n + BATCH_NOISE_N * noise(seed, len(z))).found
-    assert alarms <= 3
+    assert alarms <= 1
 
 
 @pytest.mark.parametrize("count", range(MIN_ABOVE + MIN_BELOW))
