@@ -15,7 +15,7 @@ each_type = pytest.mark.parametrize("name", TYPES)
 @each_type
 def test_a_pause_of_this_program_is_no_restart_and_no_second_drive(name: str) -> None:
     drives = DrivenDrives(name)
-    for _ in range(3):
+    for _ in range(2):
         drives.tick(count=400)
         drives.wait(2.0)
     drives.tick(count=400)

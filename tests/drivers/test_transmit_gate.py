@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from math import isfinite, nan
 from pathlib import Path
 from struct import pack, unpack
@@ -199,7 +200,6 @@ def test_closing_at_full_torque_lets_zero_leave_at_once(armed: Bench) -> None:
     assert armed.gate.refused == 0
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([MOTOR, OTHER]), st.floats(width=32)), max_size=30), st.booleans())
 def test_every_torque_that_leaves_is_within_limit_and_slew(torques: list[tuple[int, float]], is_open: bool) -> None:
     bench = Bench()
@@ -225,7 +225,7 @@ ANY_FRAME = st.builds(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100)
 @given(ANY_FRAME)
 def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: Frame) -> None:
     bench = Bench()
@@ -338,15 +338,6 @@ def test_nothing_but_the_gate_sends_on_a_port() -> None:
 
 def test_no_frame_is_repeated_by_the_kernel() -> None:
     """python-can's periodic tasks go on after this process has died, and feed the drives' watchdogs."""
-    forbidden = ("send_periodic", "CyclicSendTask", "ModifiableCyclicTask", "bcm")
-    for path in modules_of(
-        "control", "estimation", "drivers", "firmware_host", "simulation", "experiments", "command_line"
-    ):
-        source = path.read_text(encoding="utf-8")
-        if not any(word.lower() in source.lower() for word in forbidden):
-            continue
-        tree = ast.parse(source)
-        names = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-        names |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-        names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
-        assert not [name for name in names for word in forbidden if word.lower() in name.lower()], path
+    product = ("control", "estimation", "drivers", "firmware_host", "simulation", "experiments", "command_line")
+    repeating = re.compile(r"send_periodic|CyclicSendTask|CyclicTask|CAN_BCM")
+    assert not [path for path in modules_of(*product) if repeating.search(path.read_text(encoding="utf-8"))]

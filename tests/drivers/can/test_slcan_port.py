@@ -125,7 +125,7 @@ def test_malformed_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
     assert bench.port.state is BusState.ACTIVE
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(noise=st.binary(max_size=200))
 def test_no_noise_on_the_line_raises(noise: bytes) -> None:
     bench = Bench()

@@ -14,7 +14,7 @@ from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS, TORQUE_CODES
 
 damiao = pytest.importorskip("damiao_motor.core.motor", reason="the package damiao-motor, an oracle, is not installed")
-RANDOM_FRAMES = 5_000
+RANDOM_FRAMES = 1_000
 DAMIAO = {f"DM{name}": name for name in damiao.MOTOR_TYPE_PRESETS}
 
 
@@ -65,17 +65,6 @@ def test_the_other_commands_are_those_of_the_library() -> None:
     assert codec.CLEAR == damiao.DaMiaoMotor.encode_clear_error_msg() == bytes.fromhex("fffffffffffffffb")
 
 
-def test_golden_bytes() -> None:
-    assert codec.encode_torque(0.0, 18.0) == codec.encode_torque(-0.0, 18.0) == bytes.fromhex("8000800000000800")
-    assert codec.encode_torque(18.0, 18.0) == bytes.fromhex("8000800000000fff")
-    assert codec.encode_torque(-18.0, 18.0) == bytes.fromhex("8000800000000000")
-    assert codec.encode_torque(20.0, 18.0) == bytes.fromhex("8000800000000fff")
-    assert codec.encode_torque(1.0, 10.0) == bytes.fromhex("80008000000008cc")
-    assert codec.encode_read(3, 23) == bytes.fromhex("0300331700000000")
-    answer = Answer(3, codec.ENABLED, 0.0, 0.0, 0.0, 30.0, 31)
-    assert codec.encode_answer(answer, MODELS["DM4310"]) == bytes.fromhex("137fff7ff7ff1e1f")
-
-
 def test_no_code_is_zero_torque_and_the_nearest_is_taken() -> None:
     """Both libraries decode the code of zero to half a step."""
     for model in MODELS.values():
@@ -124,21 +113,6 @@ def test_random_answers_are_decoded_as_by_the_library_but_in_the_middle_of_the_s
         assert abs(ours.velocity_rad_s - theirs["vel"] - half_rad_s) < 1e-9
         assert abs(ours.torque_nm - theirs["torq"] - 0.5 * ranges.torque_step_nm) < 1e-9
         assert (ours.temperature_c, ours.last) == (theirs["t_mos"], theirs["t_rotor"])
-
-
-def test_answers_of_a_drive_that_truncates_have_the_right_mean_and_rest_at_zero() -> None:
-    random, model = Random(3), MODELS["AK80-9"]
-    values = [random.uniform(-1.0, 1.0) for _ in range(20_000)]
-    error_nm = 0.0
-    for value in values:
-        data = codec.encode_answer(Answer(1, 0, value, value, value, 30.0, 0), model)
-        answer = codec.decode_answer(data, model)
-        assert abs(answer.torque_nm - value) <= (0.5 + 1e-9) * model.torque_step_nm
-        assert abs(answer.position_rad - value) <= (1.0 + 1e-9) * model.position_rad / 65535
-        error_nm += answer.torque_nm - value
-    assert abs(error_nm / len(values)) < 0.02 * model.torque_step_nm
-    rest = codec.decode_answer(codec.encode_answer(Answer(1, 0, 0.0, 0.0, 0.0, 30.0, 0), model), model)
-    assert abs(rest.velocity_rad_s) < 1e-9 and abs(rest.torque_nm) < 1e-9 and abs(rest.position_rad) < 1e-9
 
 
 @pytest.mark.parametrize("size", [0, 6, 7, 9])

@@ -14,7 +14,7 @@ from drivers.moteus.codec import Mode, Reply
 from drivers.moteus.registers import Register, Resolution, Subframe
 
 moteus = pytest.importorskip("moteus", reason="the package moteus, the oracle of its codec, is not installed")
-RANDOM_FRAMES = 5_000
+RANDOM_FRAMES = 1_000
 COMMAND_REGISTERS = {
     "position": Register.COMMAND_POSITION,
     "velocity": Register.COMMAND_VELOCITY,
@@ -81,17 +81,6 @@ def test_the_other_frames_are_those_of_the_package() -> None:
     serial = {Register.SERIAL_NUMBER + index: moteus.INT32 for index in range(3)}
     ours = [registers.encode_read(Resolution.INT32, first, 3) for first in (Register.MODEL, Register.SERIAL_NUMBER)]
     assert package.make_custom_query(identity | serial).data == b"".join(ours)
-
-
-def test_the_published_frames_of_the_documentation() -> None:
-    """docs/protocol/can.md of mjbots/moteus, a command and its reply in int16."""
-    command = list(registers.decode_frame(bytes.fromhex("01000a07206000200150ff140400130d")))
-    assert [each.kind for each in command] == [registers.WRITE, registers.WRITE, registers.READ, registers.READ]
-    assert command[1].values == pytest.approx((0.0096, 0.072, -1.76))
-    reply = registers.replied_values(registers.decode_frame(bytes.fromhex("2404000a005000000170ff230d181400")))
-    ours = [reply[each] for each in (Register.MODE, Register.POSITION, Register.VELOCITY, Register.TORQUE)]
-    assert ours == pytest.approx([10, 0.008, 0.064, -1.44])
-    assert [reply[each] for each in (Register.VOLTAGE, Register.BOARD_TEMPERATURE, Register.FAULT)] == [12.0, 20.0, 0.0]
 
 
 def random_reply(random: Random) -> Reply:
@@ -176,7 +165,7 @@ def test_random_replies_of_any_resolution_are_read_as_by_the_package() -> None:
 
 def test_random_bytes_are_malformed_or_subframes() -> None:
     random = Random(5)
-    for _ in range(20_000):
+    for _ in range(5_000):
         data = random.randbytes(random.randint(0, 64))
         try:
             assert all(isinstance(each, Subframe) for each in registers.decode_frame(data))

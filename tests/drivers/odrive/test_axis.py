@@ -61,18 +61,6 @@ def bench() -> Bench:
     return Bench()
 
 
-@pytest.mark.parametrize(("silence_s", "restarts"), [(0.29, 0), (0.32, 1), (1.0, 1), (60.0, 1)])
-def test_a_drive_heard_again_after_a_silence_was_restarted(bench: Bench, silence_s: float, restarts: int) -> None:
-    bench.live(1.0)
-    bench.report(GET_VERSION, *PRO)
-    bench.read(1.0)
-    for number in range(1, round(silence_s / 0.002)):
-        bench.read(1.0 + 0.002 * number)
-    bench.live(2.0 + silence_s)
-    assert bench.axis.health.restarts == restarts
-    assert (bench.axis.settings.version is None) == bool(restarts)
-
-
 def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_duplicate(bench: Bench) -> None:
     for number in range(2000):
         bench.report(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
@@ -193,8 +181,8 @@ def test_a_fast_joint_or_a_jumping_or_faulty_encoder_is_no_duplicate(bench: Benc
     random = Random(1)
     readings(bench, (0.01 * number for number in range(500)))  # 5 turns/s
     readings(bench, (0.0, 0.5, 0.5, 0.5, 0.0, 0.0))
-    readings(bench, (random.uniform(-1.0, 1.0) for _ in range(20000)))
-    readings(bench, (random.choice([0.0, random.uniform(-1.0, 1.0)]) for _ in range(20000)))
+    readings(bench, (random.uniform(-1.0, 1.0) for _ in range(5000)))
+    readings(bench, (random.choice([0.0, random.uniform(-1.0, 1.0)]) for _ in range(5000)))
     assert not bench.axis.duplicates
 
 
@@ -281,7 +269,7 @@ def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(benc
 
 
 @pytest.mark.parametrize("message", [GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT])
-@pytest.mark.parametrize(("silent_s", "restarts"), [(0.25, 0), (0.35, 1)])
+@pytest.mark.parametrize(("silent_s", "restarts"), [(0.29, 0), (0.32, 1), (60.0, 1)])
 def test_any_message_after_a_silence_of_all_is_a_restart(
     bench: Bench, message: Message, silent_s: float, restarts: int
 ) -> None:
@@ -289,11 +277,14 @@ def test_any_message_after_a_silence_of_all_is_a_restart(
         bench.report(each, *((0, 1, 0, 0) if each is HEARTBEAT else (0.0, 0.0)), stamp_s=1.0)
     bench.read(1.0)
     assert bench.axis.health.restarts == 0
+    bench.report(GET_VERSION, *PRO)
+    bench.read(1.0)
     for tick in range(1, round(silent_s / 0.01) + 1):
         bench.read(1.0 + 0.01 * tick)
     bench.report(message, *((0, 1, 0, 0) if message is HEARTBEAT else (0.0, 0.0)), stamp_s=bench.now_s + 0.01)
     bench.read(bench.now_s + 0.01)
     assert bench.axis.health.restarts == restarts
+    assert (bench.axis.settings.version is None) == bool(restarts)
 
 
 def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) -> None:

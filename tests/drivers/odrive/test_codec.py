@@ -90,7 +90,7 @@ def test_messages_have_these_bytes(
 
 
 @each_message
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_the_dbc_encodes_and_decodes_as_we_do_for_every_node(
     message: Message, version: str, data: st.DataObject

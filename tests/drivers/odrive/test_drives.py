@@ -24,7 +24,6 @@ from drivers.odrive.codec import (
     Message,
     arbitration_id,
 )
-from drivers.odrive.parameters import OdriveParameters
 from drivers.odrive.settings import REPEAT_UNKNOWN_S
 from tests.drivers.odrive.odrive_bench import OdriveBench
 
@@ -106,15 +105,6 @@ def test_every_field_comes_from_its_message(bench: Bench) -> None:
     assert bench.axis.disarm_reason == 0x1000000
 
 
-def test_the_same_node_id_on_two_buses_is_two_drives() -> None:
-    duplicates = {joint: OdriveParameters(joint.split("_")[0], joint.endswith("adduction")) for joint in JOINTS}
-    bench = Bench(duplicates)
-    bench.report(GET_IQ, 0.0, 1.0)
-    bench.report(GET_IQ, 0.0, 2.0, joint="right_sweep")
-    states = bench.drives.read(1.0)
-    assert (states[0].current_a, states[2].current_a) == (1.0, 2.0)
-
-
 def known_frame(message: Message, data: bytes, **flags: bool) -> Frame:
     return Frame(arbitration_id(0, message), data, **flags)
 
@@ -159,7 +149,7 @@ ANY_FLOATS = st.tuples(st.floats(width=32), st.floats(width=32)).map(lambda pair
 ANY_FRAME = st.builds(Frame, ANY_ID, st.binary(max_size=8) | ANY_FLOATS, st.booleans(), st.just(False), st.booleans())
 
 
-def test_a_thousand_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
+def test_hundreds_of_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
     bench = Bench()
     bench.report_everything(0.0)
 
@@ -173,7 +163,7 @@ def test_a_thousand_random_frames_crash_nothing_and_leave_the_states_finite() ->
         assert all(isfinite(state.angle_rad + state.velocity_rad_s + state.current_a) for state in after)
         assert repr(after[2:]) == repr(states[2:])  # the other bus
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=10)
     @given(st.lists(ANY_FRAME, min_size=40, max_size=40))
     def examine_all(frames: list[Frame]) -> None:
         for frame in frames:

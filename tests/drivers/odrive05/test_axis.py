@@ -361,15 +361,6 @@ def test_zeros_after_a_restart_are_no_position_although_the_last_heartbeat_said_
     assert bench.health.restarts == 1
 
 
-def test_commands_of_another_program_are_counted_and_emergency_stops_are_not(bench: Bench) -> None:
-    commands = {*codec05.COMMANDS} - {codec.ESTOP.command}
-    for command in range(32):
-        if command in codec05.COMMANDS:
-            bench.far.send(Frame(NODE << 5 | command, bytes(4)))
-    bench.read()
-    assert bench.health.foreign_commands == len(commands)
-
-
 def test_nothing_is_asked_of_a_drive_that_was_never_heard(bench: Bench) -> None:
     for _ in range(100):
         bench.read()
