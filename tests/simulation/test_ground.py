@@ -1,17 +1,14 @@
 """Stones, ridges, layers and random strength of the ground act on the robot's arms and body."""
 
-from math import cos, pi, sin
+from math import pi
 from random import Random
 
 import pytest
 
-from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
 from control.records import Joints
-from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import Disturbances
 from simulation.mud.flipper_contact import ContactForce, attitude_of, plate_size
@@ -53,23 +50,6 @@ def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> Non
     assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot() -> None:
-    """The mud is too soft to hold the flipper; 0.75 N·m are 6 N at the plate."""
-    sweep_nm = -0.75
-    stone = Stone(-0.2, -0.02, 0.01)
-    plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [stone]))
-    arm, geometry = plant.arms[0], plant.parameters.geometry
-    arm.sweep_rad, arm.adduction_rad = 0.3, geometry.adduction_rad(0.3, 0.03)
-    for _ in range(2000):
-        hold_nm = 20.0 * (geometry.adduction_rad(arm.sweep_rad, 0.03) - arm.adduction_rad)
-        plant.step(STEP_S, Joints(sweep_nm, hold_nm - 0.2 * arm.adduction_velocity_rad_s, 0.0, 0.0))
-    pressed_m = stone.end_m - geometry.flipper_length_m * sin(arm.sweep_rad)
-    assert 0.0 < pressed_m < 0.001
-    # F l cos α, except for the load of the mud and the arm's weight, which is 0.01 N·m on the sweep joint.
-    thrust_n = -sweep_nm / (geometry.flipper_length_m * cos(arm.sweep_rad))
-    assert arm.force.thrust_n == pytest.approx(thrust_n, abs=0.1)
-
-
 def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
     """The arm is half a millimetre below the stone's top, in mud, or in a trough so deep that there is no mud."""
     geometry, sunk_rad = PlantParameters().geometry, -0.4
@@ -103,39 +83,9 @@ def test_ridges_lift_the_mud_under_each_flipper_by_its_own_position_on_top_of_it
     assert lifts_m == pytest.approx([0.005, -0.005])
 
 
-def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
-    """Firm mud lies 1 cm below both; half an edge carries 3 N there, and the flipper presses with 2.5 N.
-
-    The depths agree to 1 mm, in which mud under an edge yields; strong friction makes the arm come down slowly. Depth
-    is that of the lower corner, up to 2 mm deeper than the point at which its half of the edge is carried.
-    """
-    firm_below = Track([(9.0, Clay("firm below", 700.0, (Layer(0.01, 0.1, 20.0),)))], ridges=Ridges(0.005, 0.2))
-    depths_m = []
-    for crest_m in (0.005, -0.005):
-        plant = Plant(PlantParameters(fixed_base=True, joint_friction_nm_s=0.3), firm_below)
-        plant.body.forward_m = 0.05 if crest_m > 0.0 else 0.15
-        depths_m.append(depth_m(press(plant, -0.2).arms[0]) + crest_m)
-    assert 0.01 < depths_m[0] < 0.013
-    assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)
-
-
 def test_a_crust_carries_an_arm_that_sinks_without_it() -> None:
     """The arm weighs 0.4 N at the plate; this mud without a crust carries 0.1 N."""
     soup = Clay("soup", 200.0)
     sunk = pressed_arm(Track([(9.0, soup)]), 0.0)
     crusted = pressed_arm(Track([(9.0, soup._replace(layers=(Layer(0.0, 0.005, 10.0),)))]), 0.0)
     assert depth_m(crusted) < 0.005 < depth_m(sunk)
-
-
-def test_a_robot_walks_faster_where_buried_stones_hold_its_flippers(configuration: Configuration) -> None:
-    """The robot slips in this mud; bars lie across the track every 5 cm, 1 cm below the surface."""
-    soft = [(9.0, Clay("soft", 500.0))]
-    bars = [Stone(0.05 * number, 0.05 * number + 0.01, 0.01) for number in range(1, 40)]
-    distances_m = []
-    for stones in ([], bars):
-        lockstep = Lockstep(configuration, Track(soft, stones))
-        lockstep.arm()
-        lockstep.walk(WalkOrder(0.025, adaptive=False))
-        lockstep.run_for(3.0)
-        distances_m.append(lockstep.robot.plant.body_m)
-    assert distances_m[1] > 2.0 * distances_m[0]

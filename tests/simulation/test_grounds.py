@@ -16,7 +16,7 @@ def test_a_robot_walks_from_clay_over_thixotropic_mud_on_to_sand() -> None:
     robot, met = Lockstep(simulated_configuration(), track), set[type]()
     robot.arm()
     robot.walk(WalkOrder(0.03, adaptive=False))
-    for _ in range(40):
+    while robot.robot.plant.body_m < 0.17 and robot.now_s < 12.0:
         robot.run_for(0.25)
         met.add(type(robot.robot.plant.arms[0].contact.plate))
     assert {ThixotropicContact, SandContact} < met

@@ -1,4 +1,4 @@
-"""The whole program walks, slips and sticks in the muds of the paper.
+"""The whole program but its buses walks, slips and sticks in the muds of the paper.
 
 Speeds are only compared with each other. The strengths were fitted to a simpler model, so this plant does not reproduce
 every cell of Table I: see the module of the clay.
@@ -14,7 +14,7 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.parameters.recovery_parameters import RecoveryParameters
 from firmware_host.configuration.configuration import Configuration
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
@@ -30,7 +30,7 @@ def step_cm(configuration: Configuration) -> Mapping[tuple[str, int], float]:
     """
     configuration, found = replace(configuration, recovery=RecoveryParameters(attempts=0)), {}
     for water, depth_cm in WALKS:
-        robot = Lockstep(configuration, Track([(1.0, MUDS[water])]))
+        robot = Direct(configuration, Track([(1.0, MUDS[water])]))
         robot.arm()
         robot.walk(WalkOrder(depth_cm / 100.0, adaptive=False))
         starts_m = []
@@ -52,17 +52,17 @@ def test_it_moves_forward_slips_less_the_deeper_it_strides_and_sticks(
 
 
 @pytest.fixture(scope="module")
-def adaptive_walk(configuration: Configuration) -> Lockstep:
+def adaptive_walk(configuration: Configuration) -> Direct:
     """Walk adaptively over the paper's three muds, to their end or for 40 s."""
     track = Track([(COMPARTMENT_M, clay) for clay in MUDS.values()])
-    robot = Lockstep(configuration, track)
+    robot = Direct(configuration, track)
     robot.arm()
     robot.walk(WalkOrder(0.03))
     robot.run_until(lambda: robot.robot.plant.body_m >= track.length_m, 40.0)
     return robot
 
 
-def chosen_depths_m(adaptive_walk: Lockstep, compartment: int) -> list[float]:
+def chosen_depths_m(adaptive_walk: Direct, compartment: int) -> list[float]:
     """Return the depths of the last strides in a compartment; the robot still learns in the first ones."""
     start_m, chosen, position_m = compartment * COMPARTMENT_M, [], 0.0
     for stride in adaptive_walk.loop.learning.strides:
@@ -75,7 +75,7 @@ def chosen_depths_m(adaptive_walk: Lockstep, compartment: int) -> list[float]:
 
 
 def test_adaptation_crosses_every_mud_at_more_than_5_cm_per_second_deeper_in_the_soft_one(
-    adaptive_walk: Lockstep,
+    adaptive_walk: Direct,
 ) -> None:
     assert adaptive_walk.loop.mode is Mode.WALKING
     assert adaptive_walk.robot.plant.body_m >= 3.0 * COMPARTMENT_M

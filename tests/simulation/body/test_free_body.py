@@ -189,7 +189,7 @@ def test_where_the_mud_becomes_stiffer_the_force_stays_and_where_it_becomes_soft
     assert softer_n - floating_n == pytest.approx((first_n - floating_n) / 4.0)
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.floats(0.012, 0.03), st.floats(0.0, 0.01), st.integers(1, 3))
 def test_a_quarter_pressed_again_and_again_into_changing_mud_never_adds_energy(
     amplitude_m: float, middle_m: float, rounds: int

@@ -1,7 +1,7 @@
 """The reference sensor records the strokes of arms that a test moves, and of whole walks."""
 
 from dataclasses import replace
-from math import isnan, radians, sin
+from math import isnan
 
 import numpy as np
 import pytest
@@ -171,19 +171,6 @@ def observe_walk(lockstep: Lockstep, strides: int) -> tuple[list[StrideTruth], l
             thrusts_n.append(arm.force.thrust_n)
     lockstep.loop.learning.finish()  # the strides that have just ended
     return truths, thrusts_n
-
-
-def test_a_walk_has_the_strides_that_the_loop_closes_and_in_soft_mud_slip_and_advance_make_up_the_sweep(
-    configuration: Configuration,
-) -> None:
-    lockstep = Lockstep(configuration, SOFT)
-    truths, _ = observe_walk(lockstep, 3)
-    closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
-    assert [(truth.flipper, truth.index) for truth in truths] == closed
-    assert all(truth.insertion.deepest_m == pytest.approx(0.03, abs=0.002) for truth in truths)
-    arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
-    advance_m = lockstep.robot.plant.body_m / 3.0
-    assert truths[-1].stance.slip_m + advance_m == pytest.approx(arc_m, abs=0.02)  # the body coasts in extraction
 
 
 def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:

@@ -109,39 +109,6 @@ def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
 # other programs
 
 
-@pytest.mark.parametrize("name", [DAMIAO, CUBEMARS, "mit:AK80-64"])
-@pytest.mark.parametrize("every", [2, 10])
-def test_commands_of_another_program_that_are_not_seen_show_in_the_measured_torque(name: str, every: int) -> None:
-    drives = DrivenDrives(name)
-    drives.arm()
-    device = drives.devices[0]
-
-    def follow_another() -> None:
-        device.receive(device.forge_torque(1.0), drives.now_s)  # not on the bus
-        drives.torque_nm()
-
-    for number in range(200):
-        drives.tick(0.2)
-        assert not drives.axis.health.setpoint_problem
-        if number % 40 == 7:  # a single outlier now and then is none
-            follow_another()
-    for number in range(100):
-        drives.tick(0.2)
-        if number % every == 0:
-            follow_another()
-    assert [bool(axis.health.setpoint_problem) for axis in drives.drives.axes] == [True, False, False, False]
-
-
-def test_torque_that_is_missing_for_a_while_is_no_other_programs_command() -> None:
-    """A supply that sags, or the speed, may limit the torque; the joint's monitor finds what lasts."""
-    drives = DrivenDrives(DAMIAO, {"motor_current_limit_a": 1.0})
-    drives.arm()
-    for _ in range(4):
-        drives.tick(0.4, count=30)
-        drives.tick(0.05, count=30)
-        assert not drives.axis.health.setpoint_problem
-
-
 # ids
 
 

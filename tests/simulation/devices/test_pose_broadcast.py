@@ -6,7 +6,6 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,24 +13,17 @@ from typing import Any
 
 import pytest
 
-from control.controller import WalkOrder
-from control.modes import Mode
-from control.records import BodyPose, StrideEstimate
+from control.records import BodyPose
 from drivers.pose.natnet_client import NatNetClient
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import AXES, NatNetParameters, parse_axis
-from drivers.pose.pose_port import OpenedPose, PoseReport
+from drivers.pose.pose_port import OpenedPose
 from drivers.pose.rail_encoder import RailEncoderParameters
-from firmware_host.configuration.configuration import Configuration, PoseParameters
+from firmware_host.configuration.configuration import PoseParameters
 from firmware_host.pose_sources import open_pose
-from simulation.body.plant import Plant
-from simulation.devices.motion_capture import CameraFrame, MotionCapture
-from simulation.devices.motion_capture_parameters import MotionCaptureParameters
-from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+from simulation.devices.motion_capture import CameraFrame
+from simulation.devices.natnet_server import LOOPBACK
 from simulation.devices.pose_broadcast import PoseBroadcast
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import Clay
-from simulation.mud.track import Track
 from tests.waiting import LONGEST_S
 
 STEP_S = 0.002
@@ -100,56 +92,3 @@ def test_a_pose_source_that_cannot_be_provided_raises_an_os_error(short_folder: 
     encoder = RailEncoderParameters(device=str(short_folder / "real"), metres_per_count=1e-5)
     with pytest.raises(FileExistsError):
         PoseBroadcast(PoseParameters("rail_encoder", rail_encoder=encoder), 1)
-
-
-class StreamedPose:
-    """A PoseSource that captures the plant's body and sends it by NatNet over the loopback interface."""
-
-    def __init__(self, plant: Plant, latency_s: float) -> None:
-        self._plant, self._capture = plant, MotionCapture(MotionCaptureParameters(rate_hz=120.0), 1)
-        self.server = NatNetServer(latency_s=latency_s)
-        address = NatNetParameters(server=LOOPBACK, group="", command_port=self.server.address[1])
-        self.port = NatNetPort(NatNetClient(address, AXES["x"]))
-
-    def read(self, now_s: float) -> BodyPose:
-        for frame in self._capture.step(now_s, self._plant):
-            self.server.add(RecordedPose(frame.exposed_s, (frame.x_m, 0.0, 0.0)))
-        self.server.step(now_s)
-        return self.port.read(now_s)
-
-    def report(self) -> PoseReport:
-        return self.port.report()
-
-    def close(self) -> None:
-        self.server.close()
-        self.port.close()
-
-
-def strides_of(robot: Lockstep) -> list[StrideEstimate]:
-    robot.arm()
-    robot.walk(WalkOrder(0.03, adaptive=False, strides=1))
-    robot.run_until(lambda: robot.loop.mode is not Mode.WALKING, 10.0)
-    return [closed.estimate for closed in robot.loop.learning.strides]
-
-
-def test_a_late_camera_that_reports_its_latency_biases_no_bound(configuration: Configuration) -> None:
-    """In firm mud the plates do not slip while the body moves.
-
-    If 20 ms of latency are not reported the plates seem to slip, so a lower bound of k_s becomes a value below it.
-    """
-    strong = {joint: replace(drive, current_limit_a=20.0) for joint, drive in configuration.drive.items()}
-    limits = replace(configuration.limits, torque_nm=1.65)
-    adaptation = replace(configuration.adaptation, motor_force_n=10.0)
-    robot_of = replace(configuration, drive=strong, limits=limits, adaptation=adaptation)
-    track = Track([(100.0, Clay("firm", 3000.0))])
-    exact = strides_of(Lockstep(robot_of, track))
-    late = strides_of(Lockstep(robot_of, track, motion_capture=MotionCaptureParameters(120.0, latency_s=0.02)))
-    robot = Lockstep(robot_of, track)
-    with closing(StreamedPose(robot.robot.plant, 0.02)) as robot.loop.pose:
-        reported = strides_of(robot)
-    assert len(exact) == len(late) == len(reported) == 2
-    assert all(stride.k_s.at_least for stride in exact)
-    assert not any(stride.k_s.at_least for stride in late)
-    assert any(one.k_s.value < 0.95 * true.k_s.value for one, true in zip(late, exact, strict=True))
-    for one, true in zip(reported, exact, strict=True):
-        assert one.k_s.at_least and one.k_s.value == pytest.approx(true.k_s.value, rel=0.01)

@@ -15,7 +15,7 @@ from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 
 MOST_LATE_TICKS = 8  # 21 ms: the longer stalls of a busy computer
-WALK_S = 8.0
+WALK_S = 6.0
 
 
 @pytest.fixture

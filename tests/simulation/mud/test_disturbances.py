@@ -9,17 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.controller import WalkOrder
-from control.faults import FaultKind
 from control.geometry import FlipperGeometry
-from control.modes import ENERGISED, Mode
 from control.parameters.arm_mass import ArmMass
-from control.parameters.fault_bounds import FaultBounds
 from control.records import Joints
-from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import (
     CLINGING_ABOVE_EDGE_M,
@@ -201,19 +195,3 @@ def test_friction_adds_to_that_of_the_plant_and_holds_one_resting_joint(joint: s
 
 
 # whole walks
-
-
-def walking(configuration: Configuration, water: str, disturbances: Disturbances) -> Lockstep:
-    robot = Lockstep(configuration, Track([(5.0, MUDS[water])]), disturbances=disturbances)
-    robot.arm()
-    robot.walk(WalkOrder(0.04, adaptive=False))
-    return robot
-
-
-def test_a_loop_over_rare_messages_oscillates_and_is_stopped(configuration: Configuration) -> None:
-    """With a message every 10 ms the joints oscillate with 10 rad/s even in air."""
-    patient = replace(configuration, faults=FaultBounds(late_s=0.02, quiet_s=0.02, jump_rad=1.0, fast_s=1.0))
-    robot = walking(patient, "48.5", replace(LAB, sample_period_s=0.010))
-    assert robot.run_until(lambda: robot.loop.mode not in ENERGISED - {Mode.DAMPING}, 5.0)
-    kinds = {fault.kind for fault in robot.loop.faults.present}
-    assert kinds & {FaultKind.JOINT_OSCILLATING, FaultKind.JOINT_RUNAWAY}

@@ -137,7 +137,7 @@ def dense_wrench(
     )
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(attitudes, st.sampled_from(list(MUDS.values())), velocities)
 def test_strips_give_the_wrench_of_a_dense_sum(attitude: Attitude, clay: Clay, velocity_m_s: Velocity) -> None:
     """They agree to 4 % of the total force, and of its moment at half of the plate's height.
@@ -153,7 +153,7 @@ def test_strips_give_the_wrench_of_a_dense_sum(attitude: Attitude, clay: Clay, v
 
 
 @pytest.mark.parametrize("corners", [TRAPEZOID, TRAPEZOID[::-1], FIN, ELLIPSE, RECTANGLE])
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(attitudes, velocities)
 def test_panels_give_the_forces_of_a_dense_sum_over_any_outline(
     corners: Corners, attitude: Attitude, velocity_m_s: Velocity
@@ -167,7 +167,7 @@ def test_panels_give_the_forces_of_a_dense_sum_over_any_outline(
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.04 * hypot(*dense[:3]) + 0.2)
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(st.floats(0.002, 0.08), layered(), velocities)
 def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
     depth_m: float, clay: Clay, velocity_m_s: Velocity
@@ -208,20 +208,10 @@ def test_a_plate_that_turns_is_held_by_each_piece_s_own_motion() -> None:
     assert rolled.upward_outward_nm == pytest.approx(-(down_n + up_n) * gauss_m)
 
 
-@given(attitudes, st.lists(twists, min_size=1, max_size=5))
-def test_outward_and_inward_are_mirror_images(attitude: Attitude, twists: list[Twist]) -> None:
-    plate, duplicate = PlateContact(SIZE), PlateContact(SIZE)
-    mirrored = attitude._replace(per_outward=-attitude.per_outward)
-    signs = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
-    for twist in twists:
-        image = move(duplicate, Twist(*(signs * twist).tolist()), 0.01, mirrored)
-        assert image == pytest.approx((signs * move(plate, twist, 0.01, attitude)).tolist(), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("size", "relaxation"), [(SIZE, 0.0), (SIZE, 0.3), (size_of(TRAPEZOID), 0.0), (size_of(NOTCHED), 0.0)]
 )
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(attitudes, twists, st.sampled_from(list(MUDS.values())) | layered(), st.integers(1, 30))))
 def test_mud_never_returns_more_work_than_it_received(
     size: PlateSize, relaxation: float, motions: list[tuple[Attitude, Twist, Clay, int]]

@@ -57,7 +57,7 @@ def test_a_load_relaxes_and_reversing_yields_earlier_than_loading() -> None:
     assert after / before == pytest.approx(exp(-3.0 / 20.0), rel=0.01)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(attitudes, twists, st.integers(1, 30)), max_size=8))
 def test_no_path_returns_more_work_than_the_mud_received(motions: list[tuple[Attitude, Twist, int]]) -> None:
     plate, given_j = ThixotropicContact(SIZE), 0.0
