@@ -21,7 +21,7 @@ from tests.running_bench import Bench, SharedBench, running_bench
 TIMELESS = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("search", TIMELESS)
 settings.register_profile("long", TIMELESS, max_examples=10_000)
-settings.register_profile("repeatable", TIMELESS, derandomize=True)
+settings.register_profile("repeatable", TIMELESS, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored, and so its children
