@@ -78,13 +78,15 @@ def test_no_path_returns_more_work_than_the_sand_received(
 
 
 @pytest.mark.parametrize("sand", SANDS, ids=lambda sand: sand.name)
-def test_a_plate_at_rest_keeps_its_load(sand: Sand) -> None:
+def test_a_plate_at_rest_keeps_its_load_until_a_reset(sand: Sand) -> None:
     """In three dimensions the narrow sides add a part to the face's."""
     plate, deep = SandContact(PlateSize(0.025, 0.07, 0.004)), Attitude(0.03, 0.0, 1.0)
     for _ in range(300):
         moving = plate.step(0.001, sand, deep, Twist(0.1))
     assert -moving.normal_n == pytest.approx(sand.lateral_n(0.03, 0.025), rel=0.08 if sand.spatial else 1e-3)
     assert plate.step(0.001, sand, deep, Twist()) == moving
+    plate.reset()
+    assert not any(plate.step(0.001, sand, deep, Twist()))
 
 
 def pushed(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
