@@ -11,7 +11,6 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration, StatusParameters
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
@@ -29,14 +28,14 @@ SLEEP_S = 0.002
 
 def resting_robot(configuration: Configuration) -> Lockstep:
     track = Track([(0.35, MUDS["48.5"]), (5.0, MUDS["53.1"])])
-    return Lockstep(configuration, track, failures=Failures(configuration.bus))
+    return Lockstep(configuration, track)
 
 
 def walking_robot(configuration: Configuration) -> Lockstep:
     robot = resting_robot(configuration)
     robot.arm()
     robot.walk(WalkOrder(0.03, adaptive=True))
-    robot.run_for(14.0)
+    robot.run_for(7.0)
     return robot
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from control.modes import Mode
 from tests.command_line.watch.served_robot import ServedRobot
 from tests.waiting import LONGEST_S
 
@@ -89,6 +90,7 @@ def test_a_terminal_is_left_as_it_was(walked: ServedRobot, short_folder: Path, k
         terminal = Terminal(short_folder / "s", "xterm-256color")
         terminal.read_until(b"WALKING")
         assert terminal.press(key) == status
+        assert walked.mode is Mode.WALKING
     for taken, returned in (SCREEN, CURSOR):
         assert terminal.output.rindex(returned) > terminal.output.rindex(taken)
 
