@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.drive_presets import calibrated
+from simulation.harness.lockstep import Lockstep
 from tests.folders import EXAMPLE_CONFIGURATION
 from tests.recorded_walks import record_walks
 from tests.running_bench import Bench, SharedBench, running_bench
@@ -64,11 +65,15 @@ def short_folder() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="session")
-def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
-    """Record a log in which the robot walks two strides, holds, and walks one more."""
+def walked_twice(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> tuple[Path, Lockstep]:
+    """Record a log in which the robot walks two strides, holds, and walks one more; return it and the robot."""
     path = tmp_path_factory.mktemp("logs") / "two.mcap"
-    record_walks(path, configuration, 2, 1)
-    return path
+    return path, record_walks(path, configuration, 2, 1)
+
+
+@pytest.fixture(scope="session")
+def two_walks(walked_twice: tuple[Path, Lockstep]) -> Path:
+    return walked_twice[0]
 
 
 @pytest.fixture(scope="session")

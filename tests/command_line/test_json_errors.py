@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes
-from command_line.parser import build_parser, complete
+from command_line.parser import build_parser
 from tests.command_line.command_lines import run
 
 
@@ -46,24 +44,6 @@ def test_a_command_that_has_answered_adds_no_error(tmp_path: Path) -> None:
 def test_an_earlier_command_leaves_no_state() -> None:
     run("log", "info", "/none.mcap", "--json")
     assert len(json.loads(run("log", "info", "/other.mcap", "--json").stdout)["messages"]) == 1
-
-
-def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    yield parser
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                yield from commands_of(command)
-
-
-def test_every_argument_is_explained_and_every_value_is_named() -> None:
-    parser = build_parser()
-    complete(parser)
-    actions = [action for command in commands_of(parser) for action in command._actions]
-    plain = [each for each in actions if not isinstance(each, argparse._SubParsersAction)]
-    assert [each for each in plain if not each.help] == []
-    with_values = [each for each in plain if each.option_strings and each.nargs != 0 and not each.choices]
-    assert [each for each in with_values if not each.metavar] == []
 
 
 def test_a_command_line_that_names_a_command_is_parsed_as_by_the_complete_parser() -> None:

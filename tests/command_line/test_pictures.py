@@ -22,8 +22,6 @@ from experiments.pictures.stride_choice import Outcome, duration_s
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
 from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.style import OUTCOME_COLOURS
-from logs.files.log_reader import read_log
-from logs.lab.export import write_lab_csv
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
 from tests.command_line.command_lines import failure, refusal
@@ -86,17 +84,6 @@ def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
     frames = len(film_frames(walk, [walk.own_strides[1]]))
     assert shown_ms == 1000 * frames // FRAMES_PER_S  # equal frames are merged and their times added
     assert abs(shown_ms / 1000.0 - duration_s(walk, walk.own_strides[1])) <= 1.0 / FRAMES_PER_S
-
-
-def test_the_authors_form_is_drawn_too(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "walk.csv"
-    with path.open("w", encoding="utf-8") as out:
-        write_lab_csv(read_log(log), out)
-    assert main(["plot", str(path)]) == exit_codes.OK
-    assert main(["film", str(path)]) == exit_codes.OK
-    png_size(tmp_path / "walk.png")
-    png_size(tmp_path / "walk-strides.png")
-    assert capsys.readouterr().err == ""
 
 
 # drawn values
@@ -195,18 +182,6 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
         (0.0, second["t_start_s"], describe_mud(walk.strides[:2])),
         (second["t_start_s"], walk.time_s[-1], "k_p 0.20 N/cm³"),
     ]
-
-
-def test_muds_with_equal_values_are_distinguished_by_time_and_those_without_a_value_are_marked(two_walks: Path) -> None:
-    walk = read_walk(two_walks, 1)
-    second = walk.own_strides[1]
-    alike = walk._replace(noticed_s=[second["stamp_s"]], strides=[s | {"k_p": 1e6} for s in walk.strides])
-    assert [region.name for region in mud_regions(alike, None)] == [
-        "k_p 1.0 N/cm³",
-        f"k_p 1.0 N/cm³, from {second['t_start_s']:.0f} s",
-    ]
-    bounds = [stride | {"k_p_at_least": True} for stride in walk.strides]
-    assert [region.name for region in mud_regions(walk._replace(strides=bounds), None)] == ["unmeasured mud"]
 
 
 def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:

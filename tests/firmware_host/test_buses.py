@@ -159,7 +159,7 @@ def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_retur
     plug = Plug(robot)
     robot.arm()
     plug.pull()
-    plug.run(robot, 6.0)
+    plug.run(robot, 2.5)
     assert mode_of(robot) is Mode.FAULT
     names = {fault.name: fault.message for fault in robot.loop.faults.present}
     assert "there is no such interface" in names["bus_off"]
@@ -188,42 +188,25 @@ def test_no_bus_is_opened_while_torque_is_on(robot: Lockstep) -> None:
     assert tried == []
 
 
-@pytest.mark.parametrize("wait", [True, False])
-def test_a_daemon_without_its_bus_waits_if_configured_and_else_exits_with_1(
-    short_folder: Path, tmp_path: Path, wait: bool
-) -> None:
+def test_a_daemon_without_its_bus_waits_if_configured(short_folder: Path, tmp_path: Path) -> None:
     path = write_local_setup(short_folder, tmp_path / "logs")
     text = path.read_text(encoding="utf-8").replace('interface = "mudskipper_local"', 'interface = "socketcan"')
-    path.write_text(text + f"\n[loop]\nwait_for_bus = {str(wait).lower()}\n", encoding="utf-8")
+    path.write_text(text + "\n[loop]\nwait_for_bus = true\n", encoding="utf-8")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as daemon:
-        if wait:
-            report = wait_for_status(short_folder / "mudskipper.sock", daemon)
-            daemon.send_signal(signal.SIGTERM)
+        report = wait_for_status(short_folder / "mudskipper.sock", daemon)
+        daemon.send_signal(signal.SIGTERM)
         _, said = daemon.communicate(timeout=LONGEST_S)
-    assert "Traceback" not in said
-    if wait:
-        assert report["mode"] == "boot"
-        assert report["fault"]["name"] == "bus_off"
-        assert "does not open" in report["fault"]["message"]
-        assert daemon.returncode == 0
-    else:
-        assert daemon.returncode == 1
-        assert "\nmudskipperd: bus.left (socketcan " in said
+    assert "Traceback" not in said and daemon.returncode == 0
+    assert (report["mode"], report["fault"]["name"]) == ("boot", "bus_off")
 
 
-@pytest.mark.parametrize(
-    ("program", "role"),
-    [(["firmware_host.daemon"], BusRole.COMMANDS), (["command_line.main", "simulate"], BusRole.DRIVES)],
-)
-def test_a_second_program_on_a_bus_is_refused_before_it_sends_a_frame(
-    short_folder: Path, tmp_path: Path, program: list[str], role: BusRole
-) -> None:
+def test_a_second_program_on_a_bus_is_refused_before_it_sends_a_frame(short_folder: Path, tmp_path: Path) -> None:
     path = write_local_setup(short_folder, tmp_path / "logs")
     buses = load_configuration(path).bus
     ears = open_ports(buses)
-    with lock_buses({"right": buses["right"]}, role):
-        command = [sys.executable, "-m", *program, "--config", str(path)]
+    with lock_buses({"right": buses["right"]}, BusRole.COMMANDS):
+        command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
         second = subprocess.run(command, stderr=subprocess.PIPE, text=True, timeout=LONGEST_S, check=False)
     assert second.returncode == 1
     assert f"bus.right (mudskipper_local {short_folder}/right) does not open: process {os.getpid()}" in second.stderr

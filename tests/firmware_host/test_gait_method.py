@@ -14,7 +14,7 @@ from control.records import GaitTarget, Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -83,9 +83,9 @@ def test_other_methods_ignore_the_keys_of_the_gait_method(example_text: str) -> 
     assert parse_configuration(text).adaptation.method == "default"
 
 
-def walked(configuration: Configuration, strength_pa: float, method: Method, strides: int = 4) -> Lockstep:
+def walked(configuration: Configuration, strength_pa: float, method: Method, strides: int = 4) -> Direct:
     adaptation = replace(AdaptationParameters(), method=method)
-    lockstep = Lockstep(
+    lockstep = Direct(
         replace(configuration, adaptation=adaptation), Track([(100.0, Clay("made", strength_pa))]), disturbances=LAB
     )
     lockstep.arm()
@@ -94,7 +94,7 @@ def walked(configuration: Configuration, strength_pa: float, method: Method, str
     return lockstep
 
 
-def speed_m_s(lockstep: Lockstep) -> float:
+def speed_m_s(lockstep: Direct) -> float:
     return lockstep.robot.plant.body_m / lockstep.now_s
 
 
@@ -118,7 +118,7 @@ def test_a_walk_of_fixed_depth_does_not_depend_on_the_method(configuration: Conf
 
     def targets(method: Method) -> list[GaitTarget]:
         adaptation = replace(AdaptationParameters(), method=method)
-        lockstep = Lockstep(replace(configuration, adaptation=adaptation), Track([(100.0, Clay("made", 2000.0))]))
+        lockstep = Direct(replace(configuration, adaptation=adaptation), Track([(100.0, Clay("made", 2000.0))]))
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
         seen = []

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from types import FrameType
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -29,28 +25,6 @@ def test_a_duration_beyond_the_buckets_keeps_its_maximum() -> None:
     histogram.add(3.0 * LONGEST_US / 1e6)
     assert histogram.summary()["max"] == pytest.approx(3.0 * LONGEST_US)
     assert histogram.percentile_us(0.5) == pytest.approx(3.0 * LONGEST_US)
-
-
-def test_a_percentile_of_long_durations_is_found_as_soon_as_one_of_short_ones() -> None:
-    """Every `status` computes percentiles, between two ticks."""
-    assert lines_run_for(0.0198) < 2000 > lines_run_for(0.0001)
-
-
-def lines_run_for(duration_s: float) -> int:
-    histogram, lines = Histogram(), 0
-    histogram.add(duration_s)
-
-    def trace(frame: FrameType, event: str, argument: object) -> Any:
-        nonlocal lines
-        lines += event == "line"
-        return trace
-
-    sys.settrace(trace)
-    try:
-        assert histogram.percentile_us(0.99) == pytest.approx(1e6 * duration_s, abs=1.5)
-    finally:
-        sys.settrace(None)
-    return lines
 
 
 def test_missed_ticks_lower_the_reported_rate() -> None:

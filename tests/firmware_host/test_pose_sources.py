@@ -74,8 +74,6 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
         ('source = "socket"', "pose.socket = '': must name a socket where pose.source = 'socket'"),
         (NATNET + 'socket = "/s"\n[pose.natnet]\nversion = "4.1"', "pose.socket = '/s': must be left out where"),
         ('axis = "w"', "pose.axis = 'w': must be x, y or z"),
-        ("axis = [0, 0, 0]", "pose.axis = [0, 0, 0]: must be x, y or z"),
-        ("axis = [true, 0, 0]", "pose.axis = [True, 0, 0]: must be"),
         ("axis = [inf, 0, 0]", "pose.axis = [inf, 0, 0]: must be"),
         ("axis = 1979-05-27", "pose.axis = datetime.date(1979, 5, 27): must be"),
         (NATNET, "pose.natnet.version = '': must be given where no pose.natnet.server can be asked for it"),
@@ -83,7 +81,6 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
         (TABLE + 'server = "motive.lab"', "pose.natnet.server = 'motive.lab': must be an address"),
         (TABLE + 'version = "4.1"\ngroup = "10.0.0.1"', "pose.natnet.group = '10.0.0.1': must be from"),
         (TABLE + 'version = "2.5"', "pose.natnet.version = '2.5': must be from 2.6"),
-        (TABLE + 'version = "4"', "pose.natnet.version = '4': must be from 2.6"),
         (TABLE + 'version = "4.1"\nbody = "a"', "pose.natnet.body = 'a': needs a pose.natnet.server"),
         (
             TABLE + 'server = "10.0.0.1"\nbody = "a"\nbody_id = 3',

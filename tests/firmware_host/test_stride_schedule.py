@@ -16,8 +16,8 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import Recorder
 from logs.replay import replay_files
+from simulation.harness.direct import Direct
 from simulation.harness.drive_presets import calibrated
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.folders import EXAMPLE_CONFIGURATION
 
@@ -27,9 +27,9 @@ NONE = 0  # no unit until the next insertion needs the choice, as in a swing tha
 
 
 @cache
-def walked(units_per_tick: int) -> Lockstep:
+def walked(units_per_tick: int) -> Direct:
     configuration = parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
-    robot = Lockstep(configuration, paper_track(), seed=5)
+    robot = Direct(configuration, paper_track(), seed=5)
     robot.loop.learning.units_per_tick = units_per_tick
     robot.arm()
     robot.walk(WalkOrder(0.04, True, STRIDES))
@@ -51,7 +51,7 @@ def test_estimates_depths_and_walk_do_not_depend_on_the_units_per_tick(units_per
 class Watched:
     """Counts the units of each tick, and what is finished at once."""
 
-    def __init__(self, robot: Lockstep) -> None:
+    def __init__(self, robot: Direct) -> None:
         self.work = robot.loop.learning.estimator.work
         self.units: list[int] = []
         self.at_once = 0
@@ -68,7 +68,7 @@ class Watched:
 
 
 def test_no_tick_of_a_walk_runs_more_than_one_unit(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, paper_track(), seed=5)
+    robot = Direct(configuration, paper_track(), seed=5)
     robot.arm()
     watched = Watched(robot)
     robot.walk(WalkOrder(0.03, True, 2))
@@ -79,7 +79,7 @@ def test_no_tick_of_a_walk_runs_more_than_one_unit(configuration: Configuration)
 
 
 def test_the_command_of_a_tick_is_sent_before_its_learning(configuration: Configuration) -> None:
-    robot, order = Lockstep(configuration, paper_track()), list[str]()
+    robot, order = Direct(configuration, paper_track()), list[str]()
 
     def noted(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
         def noted_method(*values: Any) -> Any:
@@ -98,7 +98,7 @@ def test_the_command_of_a_tick_is_sent_before_its_learning(configuration: Config
 
 def test_a_choice_that_is_due_is_made_before_the_insertion_uses_it(configuration: Configuration) -> None:
     """Without any unit in time, all of them run at the end of the swing."""
-    robot = Lockstep(configuration, paper_track(), seed=5)
+    robot = Direct(configuration, paper_track(), seed=5)
     robot.loop.learning.units_per_tick = NONE
     robot.arm()
     robot.walk(WalkOrder(0.04))
@@ -115,7 +115,7 @@ def test_a_new_walk_finishes_the_strides_of_the_one_before(tmp_path: Path, confi
     """The first walk is stopped in the middle of its schedule, and its log replays to the same strides."""
     path = tmp_path / "walk.mcap"
     recorder = Recorder(path, configuration.text, {"robot": "test"})
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot = Direct(configuration, paper_track(), recorder=recorder)
     loop, learning = robot.loop, robot.loop.learning
     learning.units_per_tick = NONE
     robot.arm()

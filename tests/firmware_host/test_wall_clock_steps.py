@@ -22,7 +22,7 @@ def walking(configuration: Configuration) -> FailingRobot:
     return robot
 
 
-@pytest.mark.parametrize("step_s", [-2.0, -0.3, -0.012, -0.005, 0.005, 0.012, 0.1, 2.0])
+@pytest.mark.parametrize("step_s", [-2.0, -0.012, 0.005, 0.1])
 def test_a_walk_goes_on_while_the_wall_clock_is_stepped(walking: FailingRobot, step_s: float) -> None:
     robot = copy_of(walking)
     worst = Reaction.NONE

@@ -16,7 +16,7 @@ from tests.folders import SHARED_DATA
 
 LABLOGS = ("experiment", "lablogs")
 LOGS = SHARED_DATA / "flipper_in_mud"
-NAMES = ("single_12N_trial1", "single_12N_trial4", "walk_15.6N_30mm_trial3")
+NAMES = ("single_12N_trial1", "single_12N_trial4")
 REPEATABILITY = {"first_cv", "later_cv", "chi", "n", "values", "bounds", "invalid"}
 measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not next to the repository")
 
@@ -48,7 +48,7 @@ def test_a_folder_without_a_readable_log_names_each_reason(capsys: pytest.Captur
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with two trials of one mud, a walk, and a file that is no log."""
+    """Return a folder with two trials of one mud and a file that is no log."""
     folder = tmp_path_factory.mktemp("logs")
     for name in NAMES:
         shutil.copy(LOGS / f"{name}.csv.gz", folder)
@@ -75,7 +75,7 @@ def test_the_default_method_is_at_the_top_and_the_others_are_below_methods(repor
     assert report["schema"] == "experiment-lablogs/1"
     assert set(report) >= keys and set(report["methods"]["paper"]) >= keys
     for method in (report, report["methods"]["paper"]):
-        assert set(method["groups"]) == {"firm", "walk 15.6N"}
+        assert set(method["groups"]) == {"firm"}
         assert all(set(each) >= REPEATABILITY for each in method["groups"]["firm"].values())
     assert report["groups"]["firm"]["k_s"]["n"] == 2
     assert report["groups"]["firm"]["k_s"] != report["methods"]["paper"]["groups"]["firm"]["k_s"]

@@ -96,12 +96,6 @@ def test_every_command_takes_the_vertical_axis_of_the_capture(command: tuple[str
     assert refused.returncode == exit_codes.USAGE and "--vertical" in refused.stderr
 
 
-@each_command
-def test_a_log_without_a_capture_has_no_vertical_axis(command: tuple[str, ...], tmp_path: Path) -> None:
-    ended = run(*command, str(tmp_path / "walk.mcap"), "--vertical", "z")
-    assert ended.returncode == exit_codes.USAGE and "--vertical z" in ended.stderr and "Traceback" not in ended.stderr
-
-
 def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:
     log = read_log((z_up,), vertical="z")
     assert isinstance(log, EvaluatedLog) and any("sinks by 61 mm" in finding for finding in log.findings)

@@ -101,17 +101,6 @@ def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, mon
     assert known == ["w = 48.5 %", *unnamed[1:]]
 
 
-def test_a_log_without_a_walk_says_so(
-    configuration: Configuration, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    record_rest(tmp_path / "rest.mcap", configuration)
-    monkeypatch.chdir(tmp_path)
-    assert main(["log", "report", "rest.mcap"]) == exit_codes.OK
-    assert capsys.readouterr().out == "rest-report/report.html\n"
-    page = Path("rest-report/report.html").read_text(encoding="utf-8")
-    assert "The robot did not walk." in page and "No complete stride." in page
-
-
 def test_a_walk_that_is_cut_off_before_its_first_stride_ends_has_no_stride(
     configuration: Configuration, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -124,12 +113,6 @@ def test_a_walk_that_is_cut_off_before_its_first_stride_ends_has_no_stride(
     assert main(["log", "report", str(recorder.path), "--out", str(tmp_path / "page"), "--json"]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
     assert report["strides"] == [] and (tmp_path / "page" / "walk-1.svg").exists()
-
-
-def record_rest(path: Path, configuration: Configuration) -> None:
-    recorder = FileRecorder(path, configuration)
-    Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder).run_for(1.0)
-    recorder.close()
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")

@@ -34,8 +34,3 @@ def test_the_list_shows_every_component_with_its_kinds(bench: Bench) -> None:
     assert listed["schema"] == "failures/1"
     shown = bench.run("fail", "--list").stdout
     assert {row["family"] for row in listed["table"]} <= set(shown.split()) and all(joint in shown for joint in JOINTS)
-
-
-def test_an_impossible_failure_is_refused(bench: Bench) -> None:
-    assert bench.run("fail", "left_sweep.command", "garbage").returncode == exit_codes.REFUSED
-    assert bench.run("fail", "left_sweep", "off", "--for", "61").returncode == exit_codes.REFUSED

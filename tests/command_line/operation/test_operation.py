@@ -63,18 +63,6 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert [stride.k_p.value for stride in replayed.strides] == [stride["k_p"] for stride in log.strides]
 
 
-def test_sigterm_in_a_walk_raises_the_flippers_and_ends_without_torque(own_bench: Bench) -> None:
-    own_bench.run("arm")
-    own_bench.run("walk")
-    own_bench.wait_for(lambda report: report["phase"] == "stance")
-    log = read_log(own_bench.stop_daemon())
-    modes = [event["text"] for event in log.events if event["text"].startswith("mode")]
-    assert log.complete
-    assert modes[-3:] == ["mode walking to stopping", "mode stopping to hold", "mode hold to idle"]
-    assert log.ticks["torque_command_nm"][-1].tolist() == [0.0, 0.0, 0.0, 0.0]
-    assert not own_bench.socket.exists()
-
-
 def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator_clears(own_bench: Bench) -> None:
     bench = own_bench
     bench.run("arm")
@@ -136,8 +124,7 @@ def test_the_version_and_a_completion_script_are_printed() -> None:
 @pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [("wa", ["walk", "watch"]), ("log pu", ["pull"]), ("move left", ["left_adduction=", "left_sweep="]),
-     ("walk --de", ["--depth"]), ("init --drive odrive0", ["odrive05"])],
+    [("log pu", ["pull"]), ("move left", ["left_adduction=", "left_sweep="]), ("init --drive odrive0", ["odrive05"])],
 )  # fmt: skip
 def test_fish_completes_commands_options_and_joints(tmp_path: Path, typed: str, offered: list[str]) -> None:
     script = tmp_path / "mudskipper.fish"

@@ -149,12 +149,6 @@ def test_the_coefficients_are_those_of_the_load_cell_and_the_papers_method_is_ne
     assert {row["method"] for row in report()["errors"]} == {DEFAULT, PAPER}
 
 
-def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
-    found = report(truth={MUD: {"k_p": 2e6}})
-    assert found["muds"][0]["truth"] == {"k_p": 2e6}
-    assert {row["coefficient"] for row in found["errors"]} == {"k_p"}
-
-
 def test_the_recorded_profile_is_a_whole_stride_with_three_pauses() -> None:
     profile = profile_from(next(iter(measured()[0].values())))
     assert profile["time_s"].max() == pytest.approx(12.4, abs=0.3)

@@ -11,11 +11,9 @@ from control.records import Phase
 from experiments.lablogs import recording as recording_module
 from experiments.lablogs.estimates import DISTURBED, RECORDED, EvaluatedLog, read_log
 from experiments.lablogs.recording import read_recording, recording_of_lab
-from firmware_host.configuration.configuration import Configuration
 from logs.lab.columns import PAPER_CONSTANT_NM_A
 from logs.lab.lab_csv import LabLog
 from logs.replay import Replay, replay_files
-from tests.recorded_walks import record_walks
 
 ROW_S = 0.001
 
@@ -87,13 +85,11 @@ def test_a_stance_that_needs_more_than_friction_is_evidence_of_mud(lab: LabLog, 
     assert recording_of_lab(lab).has_evidence_of_mud() is in_mud
 
 
-def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(tmp_path: Path, configuration: Configuration) -> None:
-    path = tmp_path / "walk.mcap"
-    record_walks(path, configuration, 3)
-    recording, strides = read_recording([path]), replay_files([path]).strides
+def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(two_walks: Path) -> None:
+    recording, strides = read_recording([two_walks]), replay_files([two_walks]).strides
     assert recording.has_evidence_of_mud() and not recording.fixed_base
     assert repr(recording.estimate_strides("default")) == repr(strides)
-    log = read_log([path])
+    log = read_log([two_walks])
     assert isinstance(log, EvaluatedLog)
     starts_s = {
         run: rows["t_start_s"].tolist()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from pandas import read_csv
 
-from control.controller import WalkOrder
 from control.modes import Mode
 from experiments.pictures.recorded_walk import read_walk
 from firmware_host.configuration.configuration import Configuration
@@ -21,8 +20,7 @@ from logs.lab.export import write_lab_csv
 from logs.lab.lab_csv import read_lab_csv
 from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track, paper_track
+from simulation.mud.track import paper_track
 
 
 @pytest.fixture(scope="module")
@@ -66,22 +64,6 @@ def test_a_mud_begins_with_the_stride_that_revealed_it(two_walks: Path) -> None:
     walk = read_walk(two_walks)._replace(strides=strides, noticed_s=[4.0])
     assert walk.mud_starts_s == [3.0]
     assert walk._replace(noticed_s=[0.5, 6.0]).mud_starts_s == [0.5, 5.0]
-
-
-def test_another_mud_is_noticed_where_there_is_one(tmp_path: Path, configuration: Configuration) -> None:
-    """After 0.3 m of firm mud comes the softest one; the event of the loop becomes a border of the walk."""
-    path = tmp_path / "border.mcap"
-    recorder = Recorder(path, configuration.text, {"robot": "test"})
-    robot = Lockstep(configuration, Track([(0.3, MUDS["45.3"]), (1.0, MUDS["53.1"])]), recorder=recorder)
-    robot.arm()
-    robot.walk(WalkOrder(0.03, False, 5))
-    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    assert recorder.close(20.0)
-    walk = read_walk(path)
-    (noticed_s,), (start_s,) = walk.noticed_s, walk.mud_starts_s
-    (reported,) = [stride for stride in walk.own_strides if stride["t_start_s"] == start_s]
-    assert reported["stamp_s"] == noticed_s
-    assert 0.3 - 0.12 < reported["position_m"] < 0.45  # the flippers reach half a step ahead of the body
 
 
 def test_a_log_without_a_walk_says_so(tmp_path: Path, configuration: Configuration) -> None:

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import cos, sin
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from experiments.pictures.side_view import Point, view_from_side
+from experiments.pictures.side_view import view_from_side
 
 GEOMETRY = FlipperGeometry()
-SHEET = replace(GEOMETRY, plate_thickness_m=0.0)
 SWEEPS = st.floats(-1.0, 1.0)
 ADDUCTIONS = st.floats(-1.2, 0.6)
-
-
-def area_m2(polygon: list[Point]) -> float:
-    """Return the area of a polygon, positive if it runs counter-clockwise."""
-    pairs = zip(polygon, [*polygon[1:], *polygon[:1]], strict=True)
-    return sum(x1 * z2 - x2 * z1 for (x1, z1), (x2, z2) in pairs) / 2.0
 
 
 @given(SWEEPS, ADDUCTIONS, st.floats(-2.0, 2.0))
@@ -49,11 +39,3 @@ def test_every_point_of_the_plate_is_seen_within_its_outline(sweep_rad: float, a
     for x_m, _, z_m in turned:
         to_point = np.array([x_m, z_m + GEOMETRY.axis_height_m]) - outline
         assert np.all(sides[:, 0] * to_point[:, 1] - sides[:, 1] * to_point[:, 0] > -1e-12)
-
-
-@given(SWEEPS, ADDUCTIONS)
-def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, adduction_rad: float) -> None:
-    """The normal is (cos α, -sin α cos β, -sin α sin β): the area seen along y is the face times sin α cos β."""
-    outline, fraction = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
-    face_m2 = SHEET.plate_width_m * SHEET.plate_height_m
-    assert area_m2(outline) == pytest.approx(fraction * face_m2, abs=1e-12)

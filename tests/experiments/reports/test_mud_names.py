@@ -17,10 +17,6 @@ def test_a_water_content_gets_one_percent_sign_however_it_is_written(name: str) 
     assert (mud_name(name), mud_label(name), mud_text(name)) == ("47.6", "w = 47.6 %", "47.6 %")
 
 
-def test_only_a_water_content_gets_a_percent_sign() -> None:
-    assert (mud_label("47.6"), mud_text("47.6"), mud_text("47.6 at 3 cm")) == ("w = 47.6 %", "47.6 %", "47.6 % at 3 cm")
-
-
 @pytest.mark.parametrize("name", ["48.6", "48.60", "48.600 %", "w = 48.6 %", " 048.6% "])
 def test_one_water_content_is_one_mud(name: str) -> None:
     assert mud_key(name) == "48.6"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from control.modes import Mode
-from control.parameters.fault_bounds import FaultBounds
 from control.parameters.motion_parameters import MotionParameters
 from control.records import JOINTS
 from drivers.fault_injection.failures import Failures
@@ -28,7 +26,6 @@ from experiments.robot.bench_robot import (
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import read_log
-from operator_client.status_client import CallRefusedError
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -92,21 +89,6 @@ def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRob
     robot.wait(0.3)
     with pytest.raises(BenchError, match="held for .* without a request: torque went off by itself"):
         move(robot, {"right_adduction": 0.1})
-
-
-def test_a_fault_that_asks_for_a_still_pose_ends_a_move(tmp_path: Path) -> None:
-    robot = make_robot(tmp_path, replace(simulated_configuration(), faults=FaultBounds()))
-    arm(robot)
-    robot.call("move", right_sweep_rad=0.6)
-    robot.wait(0.1)
-    robot.lockstep.fail("left_sweep.current", "off", 0.1)
-    robot.wait(0.016)
-    status = robot.call("status")
-    assert not status["moving"] and status["mode"] == "hold"
-    assert "stopped on their way: " in status["notice"] and "current" in status["notice"]
-    with pytest.raises(CallRefusedError, match="current"):
-        robot.call("move", right_sweep_rad=0.6)
-    robot.close()
 
 
 def test_a_fault_that_ends_a_walk_is_reported_with_its_message(

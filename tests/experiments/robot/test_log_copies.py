@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from command_line import exit_codes
-from command_line.main import main
 from experiments.robot.log_copies import copy_since
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import LogParameters
@@ -69,7 +67,7 @@ def test_a_full_disk_leaves_no_copy_that_is_cut(
     assert [path.name for path in tmp_path.iterdir()] == ["logs"]
 
 
-def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
+def test_what_is_copied_is_replayed_without_the_segments_before_it(
     tmp_path: Path, configuration: Configuration
 ) -> None:
     """Another walk and a long rest come before the experiment's own walk."""
@@ -84,5 +82,3 @@ def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
     live = [stride.estimate for stride in robot.loop.learning.strides][2:]
     replayed = replay_files(copies).strides
     assert [repr(dataclasses.astuple(one)) for one in live] == [repr(dataclasses.astuple(one)) for one in replayed]
-    assert main(["log", "report", *map(str, copies), "--out", str(tmp_path / "report")]) == exit_codes.OK
-    assert (tmp_path / "report" / "walk-1.png").exists()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from estimation.strokes.fit_samples import FitSamples
 from experiments.run_report.figures import draw_fits
-from experiments.run_report.page import estimate_rows, group_events, quality_rows
+from experiments.run_report.page import group_events, quality_rows
 from experiments.run_report.run import Run, read_runs
 from logs.files.log_error import unwatched
 from tests.experiments.run_report.synthetic_runs import run_of, stride
@@ -41,13 +41,6 @@ def test_the_table_has_medians_over_strides_and_nothing_without_a_fit(run: Run) 
     assert rows["k_p"]["left: fits"] == 3
     assert rows["k_p"]["left: R²"] == median(samples.r_squared for samples in samples_of(run, "left", "k_p"))
     assert rows["k_s"]["right: fits"] == "-" and np.isnan(rows["k_s"]["right: R²"])  # a bound in every stride
-
-
-def test_each_stride_has_r_squared_and_residual_next_to_its_estimate(run: Run) -> None:
-    rows = estimate_rows(run, "k_e")
-    assert [(row["walk"], row["stride"]) for row in rows] == [(1, 0), (1, 1), (2, 0)]
-    for row, samples in zip(rows, samples_of(run, "right", "k_e"), strict=True):
-        assert (row["right: R²"], row["right: residual (N·cm)"]) == (samples.r_squared, 100.0 * samples.rms_residual_nm)
 
 
 def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: Run) -> None:

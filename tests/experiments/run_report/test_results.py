@@ -15,7 +15,6 @@ from control.modes import Mode
 from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.mud_layout import layout_of_lengths
-from experiments.pictures.stride_choice import Outcome
 from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
@@ -103,13 +102,6 @@ def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers() -> None:
 def test_bounds_and_invalid_estimates_are_no_values() -> None:
     run = run_of([stride("a", 0.5e6, 0.5e6, at_least=True), stride("b", 0.2e6, 0.2e6, valid=False)])
     assert report_of([run]).tables[0].rows["k_s"].tolist() == ["≥ 0.5000", "-"]
-
-
-def test_outcomes_are_counted() -> None:
-    outcomes = [Outcome.GOOD, Outcome.GOOD, Outcome.SLIPPING, Outcome.STUCK]
-    result = report_of([run_of([stride("a", outcome=outcome) for outcome in outcomes])])
-    assert result.tables[0].rows["good / slipped / stuck"].tolist() == ["2 / 1 / 1"]
-    assert "4 strides: 2 good, 1 slipped, 1 stuck." in result.texts["Result"]
 
 
 def test_the_hardest_reaction_to_a_cause_counts() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
-from unittest.mock import patch
 
 import pytest
 from pandas import DataFrame
@@ -14,22 +12,16 @@ from experiments.reports.coefficient_table import compared_frame, compared_rows
 from experiments.reports.error_table import error_rows
 from experiments.studies import estimation
 from experiments.studies.estimation import (
-    LATENCY,
     LAYERS,
-    REPEATS,
-    TORQUE,
     draw_errors,
-    methods_of,
     parse_layers,
     parse_water,
     run_part,
     study,
 )
 from experiments.study.option import OptionError
-from experiments.trials.estimation_methods import configured_method
-from experiments.trials.trial import LATENCY_S, SINGLE, TORQUE_ERROR, WALKING
+from experiments.trials.trial import TORQUE_ERROR
 from simulation.mud.clay import clay_of_water
-from simulation.mud.disturbances import NONE
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 from tests.experiments.synthetic_strides import make_estimate, make_stride
 
@@ -78,33 +70,6 @@ def test_wrong_muds_and_layers_are_refused() -> None:
     with pytest.raises(OptionError):
         study(SyntheticTrials(synthetic), mud=(STRONG,), strength=(1500.0,))
     assert parse_layers("none") == parse_layers("") == () and parse_layers("noise,torque") == ("noise", "torque")
-
-
-def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
-    single, walking = (
-        [(*names.values(), with_pose, configured_method(own)) for names, with_pose, own in methods_of(setup)]
-        for setup in (SINGLE, WALKING)
-    )
-    assert single == [("single flipper", name, True, name) for name in ("default", "paper")]
-    assert walking == [
-        *(("walking", name, True, name) for name in ("default", "paper", "paper compensated")),
-        ("walking without pose", "default", False, "default"),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("layer", "period_s", "error", "latency_s"),
-    [(REPEATS, 0.005, 0.0, 0.0), (TORQUE, 0.0, 0.032, 0.0), (LATENCY, 0.0, 0.0, LATENCY_S)],
-)
-def test_rows_torque_constants_and_times_are_disturbed_as_asked(
-    layer: str, period_s: float, error: float, latency_s: float
-) -> None:
-    interrupted = patch.object(estimation, "run_trial", side_effect=InterruptedError)
-    with interrupted as run_trial, pytest.raises(InterruptedError):
-        run_part("walking", MUDS, 1, 1, (layer,))
-    setup, _, disturbances, *_, torque_error, latency = run_trial.call_args.args
-    assert (setup, torque_error, latency) == (replace(WALKING, row_period_s=period_s), error, latency_s)
-    assert disturbances == NONE
 
 
 # in simulation

@@ -10,9 +10,7 @@ from experiments.studies.trackway import gaits_of, study
 from experiments.study.result import Result
 from experiments.trackway.plots import draw_trackway
 from experiments.trackway.simulated_walk import (
-    DEPTHS_M,
     METHODS,
-    best_depth,
     end_of,
     robot_of,
     speed_cm_s,
@@ -20,7 +18,6 @@ from experiments.trackway.simulated_walk import (
 )
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.mud.clay import MUDS
-from simulation.mud.track import paper_track
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
 NAMES = list(MUDS)
@@ -42,17 +39,6 @@ def walked(walk: Walk = WHOLE, **row: Any) -> dict[str, Any]:
 def reported(walk: Walk = WHOLE) -> Result:
     trials = SyntheticTrials(lambda **row: walked(walk, **row))
     return study(trials, trials=2, method=("default", "paper", "default"))
-
-
-def test_the_simulated_trackway_is_the_papers() -> None:
-    segments = paper_track().segments
-    assert [segment.ground for segment in segments] == list(MUDS.values())
-    assert [segment.end_m for segment in segments] == pytest.approx([0.61, 1.22, 1.83])
-    assert gaits_of(("paper",)) == {
-        "3 cm": {"depth_m": 0.03},
-        "5 cm": {"depth_m": 0.05},
-        "adaptive": {"method": "paper"},
-    }
 
 
 # the end of a walk, and the strides that count
@@ -89,11 +75,6 @@ def test_the_first_stride_of_a_constant_depth_does_not_count() -> None:
     walk = Walk([stride("firm", 0.0, step_m) for step_m in (0.02, 0.10, 0.14)], "")
     assert speed_cm_s(walk) == pytest.approx(6.0) and speed_cm_s(walk, skipped=2) == pytest.approx(7.0)
     assert speed_cm_s(Walk([stride("firm")], "a motor was too hot")) == 0.0
-
-
-def test_depths_go_from_1_5_to_5_cm_and_the_best_is_the_fastest() -> None:
-    assert len(DEPTHS_M) == 15 and (DEPTHS_M[0], DEPTHS_M[1], DEPTHS_M[-1]) == (0.015, 0.0175, 0.05)
-    assert best_depth({0.02: 5.0, 0.0275: 7.12345, 0.05: 6.0}) == {"depth_cm": 2.75, "mean": 7.123}
 
 
 # the report

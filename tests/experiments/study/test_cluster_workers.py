@@ -43,14 +43,11 @@ def ignore(done: int, total: int) -> None:
     pass
 
 
-def test_two_local_workers_find_the_digits_of_one(digits: list[Entry]) -> None:
-    assert run_parallel(WALKS, ignore, partial(run_locally, processes=2)) == digits
-
-
-def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
+def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed_and_its_loss_is_one_message(
     tmp_path: Path, digits: list[Entry]
 ) -> None:
     shown: list[tuple[int, int]] = []
+    kept: list[Entry] = []
     with running_cluster(tmp_path, workers=2) as cluster:
 
         def kill_one_after_the_first(index: int, walk: Entry) -> None:
@@ -59,19 +56,14 @@ def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
 
         workers = partial(run_on_cluster, address=cluster.address)
         assert run_parallel(WALKS, lambda *count: shown.append(count), workers, kill_one_after_the_first) == digits
-    assert shown == [(done, len(WALKS)) for done in range(len(WALKS) + 1)]
-
-
-def test_a_lost_cluster_is_one_message_after_the_results_that_it_gave(tmp_path: Path, digits: list[Entry]) -> None:
-    kept: list[Entry] = []
-    with running_cluster(tmp_path, workers=1) as cluster:
+        assert shown == [(done, len(WALKS)) for done in range(len(WALKS) + 1)]
 
         def lose(index: int, walk: Entry) -> None:
             kept.append(walk)
             cluster.end()
 
         with pytest.raises(WorkersError, match=f"the cluster at {cluster.address} was lost"):
-            run_parallel(WALKS, ignore, partial(run_on_cluster, address=cluster.address), lose)
+            run_parallel(WALKS, ignore, workers, lose)
     assert kept == digits[: len(kept)]
 
 

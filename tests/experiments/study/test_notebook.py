@@ -26,7 +26,7 @@ def test_another_plan_is_refused_with_what_differs(tmp_path: Path) -> None:
         Notebook(tmp_path, PLAN | {"joint": "left_sweep"})
 
 
-@pytest.mark.parametrize("cut", range(1, 40))
+@pytest.mark.parametrize("cut", (1, 2, 20, 39))
 def test_a_line_that_was_cut_off_costs_itself_alone(tmp_path: Path, cut: int) -> None:
     notebook = Notebook(tmp_path, PLAN)
     notebook.write("10 g", {"torque_nm": 0.1})

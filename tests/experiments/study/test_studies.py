@@ -38,10 +38,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop("experiments.studies.stroke_length", None)
 
 
-def test_the_study_of_the_guide_has_at_most_40_lines() -> None:
-    assert 10 < STUDY.count("\n") <= 40
-
-
 def test_one_file_is_a_command_with_its_table_page_and_numbers(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -75,20 +71,6 @@ def test_options_outside_of_their_declaration_are_refused(wrong: str, folder: Pa
         status = ended.code
     assert status == exit_codes.USAGE
     assert not list(folder.glob("mudskipper-*"))
-
-
-def test_the_help_of_a_study_comes_from_its_declaration(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["experiment", NAME, "--help"])
-    shown = " ".join(capsys.readouterr().out.split())
-    assert "--depth CM" in shown and "(default: 2, 3.5, 5 cm)" in shown and "--workers N" in shown
-
-
-def test_an_unknown_study_is_refused_with_those_that_exist(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["experiment", "stroke-lenght"])
-    assert ended.value.code == exit_codes.USAGE
-    assert NAME in capsys.readouterr().err
 
 
 def test_a_study_whose_annotations_are_text_is_refused(folder: Path) -> None:

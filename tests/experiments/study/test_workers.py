@@ -42,10 +42,6 @@ def test_results_come_in_the_order_of_the_trials_not_of_their_ends_and_each_is_c
     assert shown == [(done, 4) for done in range(5)]
 
 
-def test_trials_run_in_other_processes() -> None:
-    assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, ONE)
-
-
 def test_an_exception_of_a_trial_reaches_the_caller() -> None:
     with pytest.raises(ValueError, match="cannot be"):
         run_parallel([partial(broken), partial(late, 0.0)], ignore, ONE)

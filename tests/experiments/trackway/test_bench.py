@@ -123,7 +123,6 @@ class AlteredRobot(LockstepRobot):
     [
         (lambda now_s, x_m: x_m if now_s < 4.0 else None, 4.0, "", "pose of the body is lost"),
         (lambda now_s, x_m: x_m and -x_m, 4.0, "", "reverse pose.axis"),
-        (lambda now_s, x_m: x_m, 5.0, "stop", "was stopped"),
         (lambda now_s, x_m: x_m, 5.0, "disarm", "torque was switched off"),
     ],
 )

@@ -15,14 +15,12 @@ import numpy as np
 import pytest
 
 from control.geometry import FlipperGeometry
-from estimation.estimation_parameters import EstimationParameters
 from experiments.trials.load_cell_truth import (
     PAPER_SPEED_M_S,
     REVERSAL_FRACTION,
     Truth,
     true_coefficients,
 )
-from experiments.trials.trial import WALKING, run_trial
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import (
     ADHESION,
@@ -35,9 +33,6 @@ from simulation.mud.clay import (
     clay_of_water,
     rate_factor,
 )
-from simulation.mud.disturbances import NONE
-from simulation.mud.track import Track
-from tests.experiments.synthetic_strides import strides_of
 
 GEOMETRY = FlipperGeometry()
 EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m
@@ -166,17 +161,6 @@ def test_the_surface_may_lie_below_its_nominal_height() -> None:
     reported = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning["k_p"] for surface_m in (0.0, 0.003)]
     assert reported[1] == pytest.approx(reported[0], rel=0.02)
     assert reported[1] != reported[0]
-
-
-@pytest.mark.parametrize("depth_m", [0.03, 0.05])
-def test_k_p_of_a_walk_covers_the_truth_at_any_depth(depth_m: float) -> None:
-    setup = replace(WALKING, row_period_s=0.0, depth_m=depth_m)
-    walk = run_trial(setup, Track([(10.0, clay_of_water(53.1))]), NONE, 2, 1)
-    truths = {(each.flipper, each.index): truth(each).leaning["k_p"] for each in walk.truths}
-    reported = strides_of(walk, EstimationParameters())
-    assert len(reported) == 4
-    for each in reported:
-        assert abs(each.k_p.value - truths[each.flipper, each.index]) < 1.96 * each.k_p.std_error
 
 
 def test_in_stance_the_plate_is_square_to_its_path() -> None:

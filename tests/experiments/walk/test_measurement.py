@@ -12,14 +12,17 @@ from typing import Any
 
 import pytest
 
+from command_line import exit_codes
+from command_line.main import main
 from control.records import COEFFICIENTS
 from experiments.robot.lockstep_robot import LockstepRobot
+from experiments.studies import walk
 from experiments.studies.walk import walking_bench
-from experiments.study.notebook import Entry, Notebook
+from experiments.study.notebook import NAME, Entry, Notebook
 from experiments.trackway.bench import Muds, reach_of
 from experiments.trials.coefficient_page import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError, MeasuredTrials, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, MeasuredTrials
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, WalkTrials, measure, monitor_advance, require_mud
 from experiments.walk.report import Report, compared_strides, result_of, walks_of
@@ -33,11 +36,15 @@ TINY = WalkTrials((("47.6", 0.2),), trials=1, simulated=True)
 
 @cache
 def measured() -> dict[str, Entry]:
-    with TemporaryDirectory() as name:
-        bench = bench_of(Path(name), SHORT)
-        conduct_trials(bench, SHORT.planned, partial(measure, bench, SHORT), lambda done, of: None)
-        bench.robot.close()
-    return bench.notebook.entries
+    """Return the entries of `mudskipper experiment walk`, which asks nothing and leaves a folder with all results."""
+    command = ["experiment", "walk", "--simulated", "--mud", "47.6=30", "--mud", "51.2=30", "--trials", "1"]
+    with TemporaryDirectory() as name, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(walk, "WalkTrials", partial(WalkTrials, soft_strides=2))
+        assert main([*command, "--soft", "51.2", "--out", name]) == exit_codes.OK
+        folder = Path(name)
+        assert {"report.html", "summary.json", "figure6_trial1.png"} <= {path.name for path in folder.iterdir()}
+        first, *_ = (folder / NAME).read_text(encoding="utf-8").splitlines()
+        return Notebook(folder, json.loads(first)["plan"]).entries
 
 
 def bench_of(folder: Path, plan: WalkTrials) -> Bench:

@@ -52,10 +52,7 @@ SOCKET = "/run/mudskipper/mudskipper.sock"
 REFUSED = [  # a text of the example, its replacement, and the beginnings of the messages
     ("torque_nm = 0.75", "torqe_nm = 0.5", ["limits.torqe_nm: there is no such key"]),
     ("torque_nm = 0.75", "torque_nm = 9.5", ["limits.torque_nm = 9.5: must be at most 5.0"]),
-    ("torque_nm = 0.75", 'torque_nm = "0.75"', ["limits.torque_nm = "]),
-    ("torque_nm = 0.75", "torque_nm = true", ["limits.torque_nm = "]),
     ("torque_nm = 0.75", "torque_nm = nan", ["limits.torque_nm = "]),
-    ("torque_nm = 0.75", "torque_nm = [0.75]", ["limits.torque_nm = "]),
     ("torque_nm = 0.75", "torque_nm = 0.75\nsweep_max_deg = 25.0", [
         "limits.sweep_max_deg = 25.0: must be at least 30"
     ]),
@@ -70,14 +67,8 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "vesc"', [
         "drive.left_sweep.type = 'vesc': there is no such type; there are odrive, moteus, mit"
     ]),
-    *(
-        ("[drive.left_sweep]", f'[drive.left_sweep]\nserial_number = "{number}"', [
-            f"drive.left_sweep.serial_number = '{number}': must be 12 hexadecimal digits in lower case"
-        ])
-        for number in ("385F324D3037", "0x385f324d3037", "385f324d303")
-    ),
-    ("[drive.left_sweep]", "[drive.left_sweep]\ntype = 7", [
-        "drive.left_sweep.type = 7: there is no such type; there are odrive, moteus, mit"
+    ("[drive.left_sweep]", '[drive.left_sweep]\nserial_number = "385F324D3037"', [
+        "drive.left_sweep.serial_number = '385F324D3037': must be 12 hexadecimal digits in lower case"
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', ["drive.left_sweep.node_id = 0: must be at least 1"]),
     ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
@@ -101,9 +92,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         for bus, node_id, model, date, problem in (
             ("right", 5, "AK80-9", "2026-11-24", "bus = 'right': must be 'left'"),
             ("left", 6, "AK80-9", "2026-11-24", "node_id = 6: must be 5"),
-            ("left", 5, "AK80-6", "2026-11-24", "model = 'AK80-6': must be 'AK80-9'"),
             ("left", 5, "AK80-9", "2026-10-31", "date = 2026-10-31: must be at least firmware_date = 2026-11-01"),
-            ("left", 5, "AK80-9", "24.11.2026", "date = '24.11.2026': must be a date such as 2026-11-24"),
             ("left", 5, "AK80-9", "", "date = '': must be the date of the trial"),
         )
     ],
@@ -114,7 +103,6 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
             ('calibrated = { date = "2026-11-28", drive = "left 0" }\nserial_number = "385f324d3037"',
              "calibrated.drive = 'left 0': must be '385f324d3037'"),
             ('calibrated = { drive = "left 0" }', "calibrated.date = '': must be the date of the calibration"),
-            ('calibrated = { date = "28.11.26", drive = "left 0" }', "calibrated.date = '28.11.26': must be a date"),
             ('calibrated = { date = "2026-11-28", drive = "left 0" }\nfirmware_date = "2026-11-29"',
              "calibrated.date = 2026-11-28: must be at least firmware_date = 2026-11-29"),
         )
@@ -144,7 +132,6 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ]),
     ('"walking"', '"galloping"', ["gait.protocol = 'galloping': there is no such protocol; did you mean walking?"]),
     ('name = "mudskipper"', 'name = "../../x"', ["robot.name = '../../x': must be 1 to 64"]),
-    ('name = "mudskipper"', 'name = ""', ["robot.name = '': must be 1 to 64"]),
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
     (SOCKET, "x" * 120, [f"status.socket = '{'x' * 120}': must be at most 97 bytes"]),
     (SOCKET, "", ["status.socket = '': must name a socket"]),
@@ -152,7 +139,6 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         "emergency_stop.device = '': must be given", "emergency_stop.key = '': must be given"
     ]),
     ("[status]", '[status]\nread_group = "a\\u0000b"', ["status.read_group: must be without a zero byte"]),
-    ("[status]", '[status]\ndrive_group = "a\\u0000b"', ["status.drive_group: must be without a zero byte"]),
 ]  # fmt: skip
 
 
@@ -281,9 +267,7 @@ def test_a_plate_is_a_rectangle_or_the_corners_of_the_file() -> None:
         ),
         ("plate_corners_m = [[0, 0], [0, 0.06], [0, 0.03]]", ["geometry.plate_corners_m: the plate is 0 m wide"]),
         ("plate_corners_m = [[0, 0], [20, 60], [-20, 60]]", ["geometry.plate_corners_m: corner 2: 20 m outward"] ),
-        ("plate_corners_m = 5", ["geometry.plate_corners_m = 5: must be an array, in [brackets]"]),
         ("plate_corners_m = [[0, 0], [0.02], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 = [0.02]: "]),
-        ("plate_corners_m = [[0, 0], [0.02, 'x'], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 2 = 'x': "]),
         ("plate_corners_m = [[0, 0], [0.02, nan], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 2 = nan: "]),
         ("plate_angle_deg = 50.0", ["geometry.plate_angle_deg = 50.0: must be at most 45.0"]),
         ("plate_width_m = 0.25", ["geometry.flipper_length_m = 0.12: must be more than 0.125"]),

@@ -133,17 +133,6 @@ def test_a_log_that_ends_while_it_fails_reports_its_last_loss() -> None:
     assert kept.texts == ["rows missing here: 3, the log was failing on purpose"]
 
 
-def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
-    kept, failures, recorder = failing_log()
-    failures.begin("log", "intermittent", 0.0)
-    taken = put_numbers(recorder, range(200))
-    failures.end_all()
-    put_numbers(recorder, range(200, 201))
-    reported = sum(int(text.split()[3].rstrip(",")) for text in kept.texts if text.startswith("rows missing"))
-    assert 60 < sum(taken) < 140
-    assert reported == taken.count(False) == recorder.report().dropped - 2
-
-
 def test_a_writer_that_died_by_itself_stays_dead() -> None:
     kept, failures, recorder = failing_log()
     kept.reported = HEALTHY._replace(alive=False)

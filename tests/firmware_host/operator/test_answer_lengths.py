@@ -20,7 +20,7 @@ from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, PIECES_PER_ANSWER, STRIDES_PER_ANSWER, Level
 from firmware_host.sockets.status_socket import Methods
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
@@ -39,7 +39,7 @@ def every_fault() -> list[Fault]:
 @pytest.fixture(scope="module")
 def methods(configuration: Configuration) -> Methods:
     """Return the methods of a loop whose answers are as long as they can be."""
-    robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
+    robot = Direct(configuration, Track([(5.0, MUDS["48.5"])]))
     robot.arm()
     robot.walk(WalkOrder(0.03, adaptive=True, strides=STRIDES))
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 60.0)

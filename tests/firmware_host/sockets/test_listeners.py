@@ -15,7 +15,6 @@ import msgpack
 import pytest
 
 from control.rate import PERIOD_S
-from firmware_host.configuration.consistency import LONGEST_SOCKET_PATH, LONGEST_STATUS_PATH
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_file import SocketFile, operators_path
@@ -130,11 +129,6 @@ def test_the_operators_file_admits_their_group_alone(served: Served) -> None:
     assert stat.S_IMODE(found.st_mode) == 0o660
     if os.geteuid() == 0:
         assert found.st_gid == 71 and served.warnings == []
-
-
-def test_the_longest_configured_path_leaves_room_for_the_operators_socket() -> None:
-    longest = Path("/" + (LONGEST_STATUS_PATH - 1) * "s")
-    assert len(str(operators_path(longest))) == LONGEST_SOCKET_PATH
 
 
 @pytest.fixture

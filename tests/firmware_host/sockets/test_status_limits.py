@@ -141,15 +141,6 @@ def test_each_level_permits_its_methods(served: Served, peer: Peer, allowed: set
     assert served.counters["not_permitted"] == len(methods) - len(done)
 
 
-def test_a_refusal_says_which_group_to_join(served: Served) -> None:
-    served.methods = METHODS | {"status": METHODS["echo"]}
-    client = connect(served, OTHER_USER)
-    ((_, _, reading, _),) = ask(served, client, msgpack.packb([0, 1, "status", {}]))
-    ((_, _, driving, _),) = ask(served, client, ECHO)
-    assert reading.startswith(NOT_PERMITTED) and "'adduser YOU viewers'" in reading
-    assert driving.startswith(NOT_PERMITTED) and "'adduser YOU pilots'" in driving
-
-
 def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     stopped = allow_every_user(served, monkeypatch)
     operator, reader = connect(served, OPERATOR), connect(served, READER)

@@ -8,10 +8,7 @@ from typing import Any
 
 import msgpack
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
-from firmware_host.sockets.status_socket import MOST_CLIENTS
 from tests.firmware_host.sockets.served_socket import METHODS, Served, ask, connect, serve, unpacked
 
 
@@ -54,16 +51,6 @@ def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> 
     assert served.counters["dropped_slow_clients"] == 1
 
 
-def test_a_newcomer_replaces_the_client_that_was_silent_for_longest(served: Served) -> None:
-    clients = [connect(served) for _ in range(MOST_CLIENTS)]
-    serve(served, MOST_CLIENTS + 2)
-    assert ask(served, clients[0], msgpack.packb([0, 1, "echo", {}]))
-    late = connect(served)
-    assert ask(served, late, msgpack.packb([0, 2, "echo", {}])) == [[1, 2, None, {}]]
-    assert clients[1].recv(1) == b""
-    assert ask(served, clients[0], msgpack.packb([0, 3, "echo", {}]))
-
-
 def test_a_request_counts_although_its_client_has_disconnected(served: Served) -> None:
     done: list[str] = []
     served.methods = METHODS | {"disarm": lambda params, caller: done.append("disarm")}
@@ -99,31 +86,3 @@ def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
     served.methods = {"broken": lambda params, caller: params["missing"]}
     ((_, _, error, _),) = ask(served, connect(served), msgpack.packb([0, 1, "broken", {}]))
     assert "bug" in error and said == ["broken failed: KeyError: 'missing'"]
-
-
-VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
-ODD = st.one_of(
-    st.binary(max_size=200),
-    st.builds(lambda data, index: data[: index % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
-    st.builds(
-        lambda data, index, byte: data[: index % len(data)] + bytes([byte]) + data[index % len(data) + 1 :],
-        st.sampled_from(VALID),
-        st.integers(0, 99),
-        st.integers(0, 255),
-    ),
-)
-
-
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
-def test_valid_requests_are_answered_before_any_garbage(served: Served, odd: list[bytes], valid: int, cut: int) -> None:
-    client, reference = connect(served), connect(served)
-    data = b"".join(VALID[:valid] + odd)
-    answers = ask(served, client, data[:cut]) if cut else []
-    with contextlib.suppress(BrokenPipeError):
-        answers += ask(served, client, data[cut:])
-    assert [[1, n, None, {"a": n}] for n in range(valid)] == answers[:valid]
-    assert ask(served, reference, VALID[1]) == [[1, 1, None, {"a": 1}]]
-    client.close()
-    reference.close()
-    serve(served, 6)

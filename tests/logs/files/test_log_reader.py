@@ -107,7 +107,7 @@ def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
 
 def test_an_unfinished_log_is_read_up_to_its_cut(path: Path, whole: Log, tmp_path: Path) -> None:
     contents = path.read_bytes()
-    lengths = [*range(len(MCAP0_MAGIC), len(contents), 499), *range(len(contents) - 40, len(contents))]
+    lengths = [*range(len(MCAP0_MAGIC), len(contents), 1499), *range(len(contents) - 40, len(contents))]
     counts = []
     for length in lengths:
         log = read_bytes(tmp_path, contents[:length])
@@ -144,7 +144,7 @@ def test_damage_is_refused_or_leaves_the_rows_intact(path: Path, whole: Log, tmp
     chance = random.Random(2)
     contents = path.read_bytes()
     refused = 0
-    for _ in range(600):
+    for _ in range(200):
         damaged = bytearray(contents)
         damaged[chance.randrange(len(damaged))] ^= 1 << chance.randrange(8)
         try:
@@ -155,7 +155,7 @@ def test_damage_is_refused_or_leaves_the_rows_intact(path: Path, whole: Log, tmp
             continue
         assert holds_first_rows_of(log, whole)
         assert len(log.ticks) == TICKS or not log.complete
-    assert refused > 300
+    assert refused > 100
 
 
 @pytest.mark.parametrize("contents", [b"", b"time,turtle_state\n", MCAP0_MAGIC[:-1]])

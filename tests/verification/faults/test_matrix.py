@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import cycle
 from random import Random
 from typing import Any
@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 
 import verification.faults.cell
+import verification.faults.phases
+from control.fault_causes import ANSWERED_S
 from control.faults import FaultKind
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
@@ -20,6 +22,7 @@ from drivers.can import stamp_clock
 from drivers.fault_injection.failure_table import BY_NAME, FAILURE_MODES, PHASES, FailureMode
 from experiments.study.workers import run_parallel
 from simulation.harness.drive_presets import DRIVES
+from tests.copied_robots import copy_of
 from verification.faults.cell import FORBIDDEN_TICKS, run_cell
 from verification.faults.energy_bounds import REACTING_TICKS
 from verification.faults.evaluation import Cell, problems
@@ -47,12 +50,31 @@ def shows(drive: str, name: str) -> bool:
     return difference is None or difference.exists and "waived" not in (difference.changes or ())
 
 
-@pytest.fixture(scope="module")
-def cells() -> Sequence[Cell]:
-    """Run the cells; each lasts for twice the time in which the loop must notice that a drive takes torque again."""
+@cache
+def answered_robot(drive: str, phase: str, hopeless: bool) -> FaultBench:
+    """Return a robot whose drives have had their time to answer; every cell takes a copy of it."""
+    bench = bench_for(phase, Random(1), hopeless, drive)
+    bench.run_for(ANSWERED_S)
+    return bench
+
+
+def copied_robot(phase: str, random: Random, hopeless: bool, drive: str) -> FaultBench:
+    return copy_of(answered_robot(drive, "recovery" if phase == "recovery" else "idle", hopeless))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick() -> Iterator[None]:
+    """Begin cells with such copies, and let them last for twice the time in which torque that returns is noticed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(verification.faults.cell, "AFTER_S", 2.0 * FORBIDDEN_TICKS * PERIOD_S)
-        return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
+        patch.setattr(verification.faults.cell, "bench_for", copied_robot)
+        patch.setattr(verification.faults.phases, "ANSWERED_S", 0.0)
+        yield
+
+
+@pytest.fixture(scope="module")
+def cells() -> Sequence[Cell]:
+    return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
 
 
 def test_every_kind_of_fault_has_a_failure_mode_and_every_act_an_injector() -> None:
