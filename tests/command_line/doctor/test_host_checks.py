@@ -31,7 +31,6 @@ from command_line.doctor.host_facts import Limits, Mount, can_interrupts, isolat
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import ACTIVE, FreeSpace
-from logs.files.log_reader import read_log
 from tests.folders import ROOT
 
 OK, WARN, FAIL = Level
@@ -214,12 +213,6 @@ def test_a_disk_is_evaluated_by_the_walking_time_that_it_has_room_for(
     fraction: float, free_bytes: float, level: Level
 ) -> None:
     assert examine_space(FreeSpace(fraction, round(free_bytes)), 0.1).level is level
-
-
-def test_the_length_of_a_log_that_a_disk_has_room_for_is_that_of_a_walk() -> None:
-    walk = read_log(ROOT / "tests/fixtures/walk_0_1.mcap")
-    minutes = (walk.ticks["stamp_s"][-1] - walk.ticks["stamp_s"][0]) / 60.0
-    assert 0.8 < (ROOT / "tests/fixtures/walk_0_1.mcap").stat().st_size / minutes / WALK_BYTES_PER_MIN <= 1.0
 
 
 @pytest.mark.parametrize("mode", [0o700, 0o070, 0o007, 0o770, 0o000, 0o755])

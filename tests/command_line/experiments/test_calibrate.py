@@ -12,7 +12,7 @@ from command_line.main import main
 from experiments.actuator.simulation import TRUE_CONSTANT_NM_A
 from firmware_host.configuration.loading import load_configuration
 
-COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
+COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction", "--weights", "200,400", "--trials", "1")
 
 
 def test_one_command_finds_what_a_simulated_robot_was_built_with(

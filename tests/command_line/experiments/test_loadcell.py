@@ -85,17 +85,6 @@ def test_the_error_contains_the_part_that_all_trials_share(report: dict[str, Any
     )
 
 
-def test_another_mud_is_added_to_the_report(
-    report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, data, reported = run(capsys, *SHORT, "--mud", "50.3", "--out", str(folder / "out"))
-    assert status == exit_codes.OK
-    assert "2 trials are in" in reported and "2 are left" in reported
-    muds = {mud["mud"]: mud for mud in json.loads(data)["muds"]}
-    assert muds["48.6"]["k_p"]["value"] == pytest.approx(report["muds"][0]["k_p"]["value"], rel=0.03)
-    assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
-
-
 def test_a_simulated_manual_stage_with_an_encoder_finds_the_mud_as_well(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

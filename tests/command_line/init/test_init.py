@@ -64,13 +64,6 @@ def test_drives_that_are_asked_get_the_gains_for_answers_of_a_tick_ago(drive: st
     assert gains == (GAINS_OF_ASKED_DRIVES if asked else JointGains())
 
 
-def test_each_key_of_the_file_has_a_comment() -> None:
-    lines = [line for line in new_file(NewRobot()).splitlines() if " = " in line and not line.startswith("#")]
-    assert len(lines) > 40
-    assert [line for line in lines if " # " not in line and not line.startswith("protocol")] == []
-    assert "(m, 0 to 0.5)" in next(line for line in lines if line.startswith("drop_m"))
-
-
 def test_without_a_terminal_nothing_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "-", "--name", "mudcat"]) == exit_codes.OK
     assert parse_configuration(capsys.readouterr().out).robot.name == "mudcat"

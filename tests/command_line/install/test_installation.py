@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import sysconfig
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,7 +30,6 @@ from command_line.install.service_plan import (
     plan_installation,
     plan_removal,
 )
-from tests.folders import ROOT
 
 PREFIX = Path("/opt/robot/venv")
 
@@ -120,23 +118,11 @@ def test_all_files_are_written_readable_for_every_user_and_the_service_is_enable
     assert (machine.root / LINK).is_symlink()
 
 
-def test_an_installed_package_carries_the_files_of_this_one() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["tool"]["setuptools"]["data-files"] == {"share/mudskipper": ["systemd/*"]}
-    assert all((ROOT / "systemd" / name).is_file() for name in SOURCES.values())
-
-
 def test_where_there_is_no_working_tree_the_files_come_from_the_environment(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(service_plan, "__file__", str(tmp_path / "site-packages/command_line/install/service_plan.py"))
     assert service_plan.source_folder() == Path(sysconfig.get_path("data")) / "share/mudskipper"
-
-
-def test_the_unit_starts_the_daemon_of_the_environment_that_installed_it() -> None:
-    unit = load_sources(PREFIX)[UNIT]
-    assert "ExecStart=/opt/robot/venv/bin/mudskipperd --config /etc/mudskipper/mudskipper.toml" in unit
-    assert "/opt/mudskipper" not in unit
 
 
 def test_the_second_time_there_is_nothing_to_do(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:

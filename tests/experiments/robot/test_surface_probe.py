@@ -15,8 +15,8 @@ from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.surface_probe import Descent, Touch, combined, find_touched, probe_surface
+from simulation.harness.direct import Direct, plant_of
 from simulation.harness.file_recorder import FileRecorder
-from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -39,7 +39,7 @@ def robot_above(lower_m: float, folder: Path) -> LockstepRobot:
         fixed_base=True,
         geometry=replace(configuration.geometry, axis_height_m=axis_height_m),
     )
-    lockstep = Lockstep(configuration, Track([(5.0, Clay("mud", 1500.0))]), recorder=recorder, plant=plant)
+    lockstep = Direct(configuration, Track([(5.0, Clay("mud", 1500.0))]), recorder=recorder, plant=plant)
     return LockstepRobot(lockstep, recorder)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from control.geometry import FlipperGeometry
-from experiments.studies.grounds import GROUNDS, disturbances_on, study, walk
+from experiments.studies.grounds import GROUNDS, disturbances_on, study
 from simulation.mud.disturbances import TRACKWAY
 from simulation.test_rig.load_cell import LoadCell
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
@@ -31,11 +31,6 @@ def test_a_ground_has_no_disturbance_twice_and_dry_sand_does_not_cling() -> None
     mud, sand = (disturbances_on(GROUNDS[name], TRACKWAY) for name in ("thixotropic", "sand-generic"))
     assert (mud.remoulding, mud.clinging_n, sand.clinging_n) == (0.0, TRACKWAY.clinging_n, 0.0)
     assert disturbances_on(GROUNDS["clay-1.4"], TRACKWAY) == TRACKWAY
-
-
-def test_the_robot_walks_on_sand() -> None:
-    walked = walk("sand-generic", 3.0, 1)
-    assert 3.0 < walked["cm_s"] < 9.0 and walked["stuck"] == 0
 
 
 def test_the_study_compares_the_choice_with_the_best_constant_depth_and_counts_intervals() -> None:

@@ -7,9 +7,8 @@ from control.records import COEFFICIENTS
 from experiments.studies.paths import walk
 
 
-@pytest.mark.parametrize("gait", ["ellipse", "backward"])
-def test_a_walk_along_another_path_gives_the_coefficients_of_a_load_cell(gait: str) -> None:
-    rows = DataFrame(walk(gait, 1400.0, 1, 0.03, 3)["estimates"])
+def test_a_walk_along_another_path_gives_the_coefficients_of_a_load_cell() -> None:
+    rows = DataFrame(walk("backward", 1400.0, 1, 0.03, 3)["estimates"])
     for name in COEFFICIENTS:
         found = rows[rows["coefficient"] == name]
         assert found["ratio"].count() >= 4, name

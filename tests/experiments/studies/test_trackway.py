@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from experiments.studies.trackway import gaits_of, study
+from experiments.studies.trackway import study
 from experiments.study.result import Result
 from experiments.trackway.plots import draw_trackway
 from experiments.trackway.simulated_walk import (
@@ -14,9 +14,8 @@ from experiments.trackway.simulated_walk import (
     end_of,
     robot_of,
     speed_cm_s,
-    walk_trackway,
 )
-from experiments.trackway.walk import Walk, WalkedStride, walk_of
+from experiments.trackway.walk import Walk, WalkedStride
 from simulation.mud.clay import MUDS
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
@@ -104,31 +103,3 @@ def test_the_picture_has_a_line_for_each_gait_and_a_dot_for_each_speed() -> None
     panels = {panel.get_ylabel(): panel for panel in draw_trackway(reported().summary).axes}
     assert set(panels) == {"step length (cm)", "depth (cm)", "speed (cm/s)"}
     assert len(panels["step length (cm)"].lines) >= 4 and panels["step length (cm)"].get_legend() is not None
-
-
-# in simulation
-
-
-@pytest.fixture(scope="module")
-def short() -> dict[str, Walk]:
-    """Simulate compartments of less than two steps."""
-    return {name: walk_of(walk_trackway(0.2, 1, **gait)) for name, gait in gaits_of(("default",)).items()}
-
-
-def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end(short: dict[str, Walk]) -> None:
-    for walk in short.values():
-        assert list(dict.fromkeys(each.mud for each in walk.strides)) == NAMES
-        assert end_of(walk.strides, 0.6) == "past the end"
-
-
-def test_fixed_gaits_keep_their_depth_and_the_adaptive_one_does_not(short: dict[str, Walk]) -> None:
-    depths = {name: {each.depth_m for each in walk.strides} for name, walk in short.items()}
-    assert (depths["3 cm"], depths["5 cm"]) == ({0.03}, {0.05})
-    assert len(depths["adaptive"]) > 1
-
-
-def test_three_centimetres_slip_in_the_soft_mud_and_five_get_stuck_in_the_firmest(short: dict[str, Walk]) -> None:
-    failures = {name: {each.failure(0.12) for each in walk.in_mud("53.1")} for name, walk in short.items()}
-    assert "slippage" in failures["3 cm"] and failures["5 cm"] == {""}
-    failures = {name: {each.failure(0.12) for each in walk.in_mud("45.3")} for name, walk in short.items()}
-    assert "extraction" in failures["5 cm"] and "extraction" not in failures["3 cm"]

@@ -14,7 +14,7 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
 from logs.files.log_reader import read_log
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.track import paper_track
 from tests.recorded_walks import walk_and_hold
 from tests.scripted_operator import ScriptedOperator
@@ -29,7 +29,7 @@ def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
         {"robot": "test", "run_id": "run"},
         LogParameters(directory=str(tmp_path), segment_s=1.0),
     )
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot = Direct(configuration, paper_track(), recorder=recorder)
     # The writer ends segments between its batches, which cover seconds of a simulation that runs faster than real time.
     logged = [LoggedTime("run", *span_s) for span_s in walk_and_hold(robot, 1, 2, rest_s=15.0)]
     assert recorder.close(20.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from experiments.trackway.simulated_walk import walk_trackway
+from experiments.trackway.simulated_walk import end_of, walk_trackway
 from experiments.trackway.table_one import FIXED_DEPTHS_M, PAPER_TABLE, Speed, speed_cell, table_one, within_one_sd
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.mud.clay import MUDS
@@ -73,4 +73,8 @@ def test_a_walk_has_the_speeds_of_the_paper_within_one_standard_deviation(gait: 
     walk = walk_of(walk_trackway(COMPARTMENT_M, 1, FIXED_DEPTHS_M[gait]))
     speeds = {mud: speed_cell([walk], mud, ARM_M)["mean"] for mud in MUDS}
     assert all(within_one_sd(speeds[mud], PAPER_TABLE[gait][mud]) for mud in MUDS), speeds
-    assert list(PAPER_TABLE[gait]) == list(MUDS)
+    assert list(PAPER_TABLE[gait]) == list(MUDS) == list(dict.fromkeys(each.mud for each in walk.strides))
+    assert {each.depth_m for each in walk.strides} == {FIXED_DEPTHS_M[gait]}
+    assert end_of(walk.strides, 3.0 * COMPARTMENT_M) == "past the end"
+    failures = {mud: {each.failure(ARM_M) for each in walk.in_mud(mud)} for mud in MUDS}
+    assert ("slippage" in failures["53.1"]) is ("extraction" not in failures["45.3"]) is (gait == "3 cm")

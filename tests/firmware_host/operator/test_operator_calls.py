@@ -18,7 +18,7 @@ from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import METHODS, Level
 from firmware_host.trial import BEGUN, OperatorReport, from_json, read_report
-from simulation.harness.direct import Direct
+from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.copied_robots import copy_of
@@ -32,7 +32,7 @@ WALL_S = 1_800_000_000.25
 class Robot:
     """A simulated robot with the methods of its socket."""
 
-    def __init__(self, robot: Direct) -> None:
+    def __init__(self, robot: Lockstep) -> None:
         assert isinstance(robot.loop.recorder, EventRecorder)
         self.events, self.steps, self.lease = robot.loop.recorder, robot, robot.loop.lease
         calls = OperatorCalls(self.steps.loop, [], lambda: self.steps.now_s, lambda: WALL_S)
@@ -42,8 +42,8 @@ class Robot:
         return self._methods[method](params, caller)
 
 
-def new_robot(configuration: Configuration) -> Direct:
-    return Direct(configuration, Track([(5.0, MUDS["48.5"])]), recorder=EventRecorder())
+def new_robot(configuration: Configuration) -> Lockstep:
+    return Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=EventRecorder())
 
 
 @pytest.fixture
@@ -52,14 +52,14 @@ def robot(configuration: Configuration) -> Robot:
 
 
 @pytest.fixture(scope="module")
-def armed_robot(configuration: Configuration) -> Direct:
+def armed_robot(configuration: Configuration) -> Lockstep:
     robot = new_robot(configuration)
     robot.arm()
     return robot
 
 
 @pytest.fixture
-def armed(armed_robot: Direct) -> Robot:
+def armed(armed_robot: Lockstep) -> Robot:
     return Robot(copy_of(armed_robot))
 
 
