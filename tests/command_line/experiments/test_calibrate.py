@@ -9,21 +9,23 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.actuator.simulation import TRUE_CONSTANT_NM_A
+from experiments.calibration.robots import CalibratedRobot
 from firmware_host.configuration.loading import load_configuration
+from tests.experiments.calibration.test_calibration import TRUE_NM_A, WeighedRobot
 
-COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction", "--weights", "200,400", "--trials", "1")
+COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
 
 
 def test_one_command_finds_what_a_simulated_robot_was_built_with(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(CalibratedRobot, "weigh", WeighedRobot.weigh)  # without the minutes of the weights
     command = [*COMMAND, "--operator", "Ada", "--out", str(tmp_path)]
     assert main([*command, "--json"]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
     assert report == json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
     (joint,), (hands,) = report["joints"], report["hands"]
-    assert joint["torque_constant_nm_a"] == pytest.approx(TRUE_CONSTANT_NM_A, rel=0.02)
+    assert joint["torque_constant_nm_a"] == pytest.approx(TRUE_NM_A, rel=0.02)
     assert (report["operator"], hands["sign"]) == ("Ada", -1)  # by the robot of the default seed
     drive = load_configuration(tmp_path / "mudskipper.toml").drive["right_adduction"]
     assert drive.sign == -1 and drive.torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -18,24 +17,29 @@ from mcap.reader import make_reader
 from command_line import exit_codes, screen
 from command_line.main import main
 from experiments.pictures.recorded_walk import read_walk
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import ONE_FILE
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 from logs.files.log_reader import read_log
 from tests.command_line.command_lines import json_of, run
+from tests.recorded_walks import record_walks
 from tests.waiting import LONGEST_S
 
 
 @pytest.fixture(scope="module")
-def walk(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(shutil.copy(two_walks, tmp_path_factory.mktemp("logs") / "walk.mcap"))
+def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    """Record a walk of two strides."""
+    path = tmp_path_factory.mktemp("logs") / "walk.mcap"
+    record_walks(path, configuration, 2)
+    return path
 
 
 def test_log_info_counts(walk: Path) -> None:
     reported = json_of("log", "info", str(walk))
     assert reported["robot"] == "test" and reported["complete"] is True
-    assert reported["missed_ticks"] == 0 and reported["strides"] == 6
+    assert reported["missed_ticks"] == 0 and reported["strides"] == 4
     assert reported["segment"] is None or isinstance(reported["segment"], int)
     assert reported["unknown_fields"] == [] and 0 < reported["rows"] <= reported["ticks"]
     lines = dict(line.split(maxsplit=1) for line in run("log", "info", str(walk)).stdout.splitlines())
@@ -89,7 +93,7 @@ def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, segments
     assert (repr(joined.strides), joined.cut) == (repr(whole.strides), "")
     assert run("plot", *paths, "--out", str(tmp_path / "walk.png")).stderr == ""
     reported = json_of("log", "info", *paths)
-    assert reported["strides"] == 6
+    assert reported["strides"] == 4
 
 
 def test_a_walk_over_a_border_of_segments_is_reported(segments: list[Path], tmp_path: Path) -> None:

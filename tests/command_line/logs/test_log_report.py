@@ -110,8 +110,9 @@ def test_a_log_that_is_cut_off_before_its_first_stride_ends_is_named_in_headline
     robot.walk(WalkOrder(0.03, True, 1))
     robot.run_for(0.3)
     recorder.close()
-    recorder.path.write_bytes(recorder.path.read_bytes()[:-100])
-    ended = run("log", "report", str(recorder.path), "--out", str(tmp_path / "page"), "--json")
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(path.read_bytes()[:-100])
+    ended = run("log", "report", str(path), "--out", str(tmp_path / "page"), "--json")
     report = json.loads(ended.stdout)
     assert ended.returncode == exit_codes.UNHEALTHY and report["headline"]["complete"] is False
     assert report["strides"] == [] and (tmp_path / "page" / "walk-1.svg").exists()

@@ -35,7 +35,7 @@ JOINT = "right_adduction"
 PLAN = WeighingPlan((JOINT,), weights_g=(200.0, 400.0), trials=2, trusts_constant=False)
 UNCALIBRATED: dict[tuple[str, ...], Any] = {("drive", joint, "calibrated"): {} for joint in JOINTS}
 CONFIGURATION = parse_configuration(changed_text(simulated_configuration().text, UNCALIBRATED))
-TRUE_NM_A = 0.065
+TRUE_NM_A = 0.072
 LOOPS = [Loop(0.2, 0.2, quick, 0.8)._asdict() for quick in (False, False, True, True)]
 
 

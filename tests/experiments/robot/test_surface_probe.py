@@ -15,8 +15,9 @@ from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.surface_probe import Descent, Touch, combined, find_touched, probe_surface
-from simulation.harness.direct import Direct, plant_of
+from simulation.harness.direct import Direct
 from simulation.harness.file_recorder import FileRecorder
+from simulation.harness.lockstep import plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
