@@ -7,9 +7,7 @@ from typing import Any
 import pytest
 
 from command_line.robot_text import is_stale, torque_state, unheard_text
-from command_line.screen import coefficient
 from control.records import JOINTS
-from experiments.reports.text_tables import number
 
 
 @pytest.mark.parametrize(
@@ -38,18 +36,3 @@ def test_the_status_names_drives_that_were_not_heard_yet() -> None:
     drives[3] = drives[3] | {"angle_age_s": None}
     line = unheard_text({"drives": drives})
     assert "left_adduction, right_adduction" in line and "left_sweep" not in line
-
-
-@pytest.mark.parametrize(("value", "text"), [(-0.0001, "0.000"), (-0.0, "0.000"), (-0.001, "-0.001"), (None, "-")])
-def test_a_zero_has_no_sign(value: float | None, text: str) -> None:
-    assert number(value) == text
-
-
-@pytest.mark.parametrize(
-    ("valid", "at_least", "text"),
-    [(True, False, "1.235 ± 0.046"), (True, True, "≥ 1.235 ± 0.046"), (False, True, "(≥ 1.235 ± 0.046)")],
-)
-def test_an_estimate_is_printed_with_its_standard_error_and_its_limits(valid: bool, at_least: bool, text: str) -> None:
-    reported = {"value": 1.23456e6, "std_error": 4.56e4, "valid": valid, "at_least": at_least}
-    assert coefficient(reported) == text
-    assert coefficient(reported | {"value": None}) == "-"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +21,6 @@ from logs.files.log_error import LogError, Watch
 from logs.files.log_reader import read_log
 from logs.recovery import recover_all, recover_log, salvage_rows
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
-from tests.waiting import LONGEST_S
 
 CHUNK = 100  # ticks
 
@@ -142,14 +139,6 @@ def test_a_disk_without_room_keeps_the_broken_one(tmp_path: Path, monkeypatch: p
     assert len(read_log(tmp_path / DONE / path.name).ticks) == 5 * CHUNK
 
 
-def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
-    make_cut_log(tmp_path)
-    command = [sys.executable, "-m", "logs.recovery", str(tmp_path)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
-    assert "recovered: 500 rows;" in ended.stderr and ended.stdout == ""
-    assert unfinished_files(tmp_path) == []
-
-
 def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
     """Write a log with another program's compression, or with other topics or another layout of its rows."""
     ticks = [payload for _, payload in make_ticks(0, 300)]
@@ -211,14 +200,6 @@ def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="damaged"):
         read_log(path)
     assert recover_log(path).rows == 5 * CHUNK
-
-
-def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
-    path = make_file(tmp_path / "run.mcap").finish()
-    contents = bytearray(path.read_bytes())
-    contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
-    path.write_bytes(contents)
-    assert recover_log(path).note == f"recovered: {4 * CHUNK} rows, {CHUNK} lost in damaged places"
 
 
 def test_a_log_that_is_cut_off_during_its_recovery_stays_for_another_one(

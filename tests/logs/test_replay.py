@@ -80,17 +80,6 @@ def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
 
-@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not next to the repository")
-@pytest.mark.parametrize("path", LAB_LOGS, ids=lambda path: path.name.removesuffix(".csv.gz"))
-def test_the_authors_logs_replay_with_forces_of_the_right_sign(path: Path) -> None:
-    replayed = replay_files([path])
-    first = replayed.strides[0]
-    assert len(replayed.strides) >= 1
-    assert first.insertion_force_n > 1.0
-    assert first.stance_force_n > 4.0
-    assert first.extraction_force_n < -1.0
-
-
 # First strokes in undisturbed mud, ranges over all trials measured with the published formula: mud-physics 1.5. The
 # extraction peak is a single sample, so it is allowed the noise of one, 0.3 N, beyond the range.
 MEASURED = {

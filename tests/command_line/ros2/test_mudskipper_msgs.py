@@ -11,10 +11,10 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from command_line.live.standard_messages import BASE, ODOM, TOPICS, flipper_pose
+from command_line.live.standard_messages import ODOM, TOPICS, flipper_pose
 from command_line.ros2.own_messages import LAPTOP_FILES
 from control.geometry import FlipperGeometry
-from control.records import FLIPPERS, JOINTS
+from control.records import FLIPPERS
 from firmware_host.log.rows import STRIDE
 
 GEOMETRY = FlipperGeometry()
@@ -48,12 +48,6 @@ def test_the_model_s_plate_is_where_the_kinematics_have_it(flipper: str) -> None
     pose = flipper_pose(GEOMETRY, flipper, angles_rad[f"{flipper}_sweep"], angles_rad[f"{flipper}_adduction"])
     assert turned.apply(edge_m) == pytest.approx(pose.position_m)
     assert size_m.tolist() == [GEOMETRY.plate_thickness_m, GEOMETRY.plate_width_m, GEOMETRY.plate_height_m]
-
-
-def test_the_model_has_the_robot_s_joints_below_its_base() -> None:
-    assert {joint.attrib["name"] for joint in MODEL.findall("joint")} == set(JOINTS)
-    children = {child.attrib["link"] for child in MODEL.findall("joint/child")}
-    assert {link.attrib["name"] for link in MODEL.findall("link")} - children == {BASE}
 
 
 def test_rviz_shows_topics_that_are_published_and_finds_the_files() -> None:

@@ -16,9 +16,3 @@ def test_nothing_moves_without_permission(answer: str, consents: bool) -> None:
     operator = ScriptedOperator(answer)
     assert BenchOperator(operator, sure=False).allows_motion("It moves.", nothing) is consents
     assert operator.asked == ["It moves."]
-
-
-def test_permission_in_advance_is_reported_and_not_asked_for() -> None:
-    operator = ScriptedOperator("n")
-    assert BenchOperator(operator, sure=True).allows_motion("It moves.", nothing)
-    assert (operator.asked, operator.reported) == ([], ["It moves."])

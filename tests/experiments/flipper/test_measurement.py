@@ -215,14 +215,6 @@ def test_without_a_load_cell_there_are_no_errors() -> None:
     assert all(figure.draw().axes for figure in result.figures)
 
 
-def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
-    found = report(method="paper")
-    (entry,) = measured()[0].values()
-    assert found["muds"][0]["k_p"].trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
-    assert found["settings"]["method"] == "paper"
-    assert (found["misfit_n"][MUD]["insertion"] or 0.0) > 0.0
-
-
 def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
     """Like this rig, the paper's own bench has one flipper (section II-C)."""
     bench = bench_in(tmp_path, rig=Rig(("right",)))

@@ -20,7 +20,6 @@ from control.records import JOINTS, Phase
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log
 from logs.files.tick_array import tick_type
-from logs.lab.columns import STATE_OF_PHASE
 from logs.lab.export import write_lab_csv
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import LabLog, read_lab_csv
@@ -249,7 +248,3 @@ def test_a_broken_off_archive_names_the_last_good_line(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"run\.csv\.gz: .* is damaged after line \d+$") as refusal:
         read_lab_csv(path)
     assert 2000 < int(str(refusal.value).split()[-1]) < 3000
-
-
-def test_every_phase_has_a_state_to_be_written_as() -> None:
-    assert set(STATE_OF_PHASE) == set(Phase)
