@@ -64,15 +64,15 @@ lock: .venv/setup  ## write requirements/*.txt from pyproject.toml; needs the In
 	@$(LOCK) --extra plots --extra screen --extra serial --extra data --extra cluster --extra test --extra docs --extra inputs pyproject.toml --output-file requirements/development.txt $(ARGS)
 	@printf 'mypy>=1.14,<3\nsetuptools>=77\n' | $(LOCK) - --output-file requirements/compiler.txt $(ARGS)
 
-docs: .venv/test  ## build the documentation into build/docs; a warning is an error
+docs: .venv/test  ## build the documentation into build/docs and run its notebooks; a warning is an error
 	@$(SPHINX) -b html docs build/docs
 	@echo "open build/docs/index.html"
 
 docs-links: .venv/test  ## check the external links of the documentation; needs the Internet
-	@$(SPHINX) -b linkcheck docs build/links
+	@$(SPHINX) -D nb_execution_mode=off -b linkcheck docs build/links
 
 man: .venv/test  ## build the manual page build/man/mudskipper.1
-	@$(SPHINX) -b man docs build/man
+	@$(SPHINX) -D nb_execution_mode=off -b man docs build/man
 	@echo "man -l build/man/mudskipper.1"
 
 clean:  ## remove the environment and everything that was built

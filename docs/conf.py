@@ -1,4 +1,4 @@
-"""Configures Sphinx: MyST Markdown, the furo theme, and the reference pages that are written from the code."""
+"""Configures Sphinx: MyST Markdown and notebooks, the furo theme, and the reference pages that the code describes."""
 
 import os
 import sys
@@ -21,7 +21,11 @@ write_tables(DOCS / "reference" / "generated")
 project = "mudskipper"
 author = "the mudskipper project"
 release = version = installed_version("mudskipper")
-extensions = ["myst_parser", "sphinx_copybutton"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton"]
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120  # seconds of one cell
+nb_merge_streams = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # the standard library's types, and internal ones
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
 exclude_patterns = ["generate", "reference/generated"]
