@@ -10,7 +10,7 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import same_for_all
+from control.records import Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_INPUT_TORQUE
@@ -22,7 +22,7 @@ from simulation.devices.drive import DriveError
 from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.harness.drive_presets import calibrated
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
+from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
 from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
@@ -181,6 +181,18 @@ def test_the_slew_limit_does_not_grow_with_missed_ticks(walked: dict[float, Lock
     largest_nm = robot.loop.configuration.limits.torque_rate_nm_s * PERIOD_S
     for before, after in zip(before_nm, robot.loop.sent.torques_nm, strict=True):
         assert abs(after - before) <= largest_nm + 1e-12
+
+
+def test_flippers_that_stay_in_the_mud_are_reported(configuration: Configuration) -> None:
+    robot = Lockstep(configuration, Track([(5.0, Clay("3 kPa", 3000.0))]))
+    robot.arm()
+    robot.walk(WalkOrder(0.05, False))
+    robot.run_until(lambda: robot.loop.target.phase is Phase.STANCE, 5.0)
+    for arm in robot.robot.plant.arms:
+        arm.track = Track([(5.0, Clay("9 kPa", 9000.0))])
+    robot.loop.request(Request.STOP, robot.now_s)
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 5.0)
+    assert robot.loop.events.notice == "the flippers did not come out of the mud"
 
 
 def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:

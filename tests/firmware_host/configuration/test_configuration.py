@@ -267,6 +267,7 @@ def test_a_plate_is_a_rectangle_or_the_corners_of_the_file() -> None:
         ),
         ("plate_corners_m = [[0, 0], [0, 0.06], [0, 0.03]]", ["geometry.plate_corners_m: the plate is 0 m wide"]),
         ("plate_corners_m = [[0, 0], [20, 60], [-20, 60]]", ["geometry.plate_corners_m: corner 2: 20 m outward"] ),
+        ("plate_corners_m = 5", ["geometry.plate_corners_m = 5: must be an array, in [brackets]"]),
         ("plate_corners_m = [[0, 0], [0.02], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 = [0.02]: "]),
         ("plate_corners_m = [[0, 0], [0.02, nan], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 2 = nan: "]),
         ("plate_angle_deg = 50.0", ["geometry.plate_angle_deg = 50.0: must be at most 45.0"]),

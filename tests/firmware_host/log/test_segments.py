@@ -270,3 +270,12 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     ]
     left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
     assert left.ticks["tick"].tolist() == list(range(10))  # complete to the last row, not only to the last chunk
+
+
+def test_the_quota_frees_the_oldest_and_says_so(tmp_path: Path) -> None:
+    make_old_logs(tmp_path)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=9000))
+    log.write([make_event("first")])
+    assert log.close()
+    events = [event["text"] for event in read_log(tmp_path / DONE / "run-0000.mcap").events]
+    assert "room for logs: 1.mcap was deleted, 5000 bytes, not copied" in events
