@@ -224,12 +224,13 @@ MIB = 1024 * 1024
 BOMBS = {  # compression, sizes of the chunks, what the refusal says
     "lz4, 16 MiB in 69 kB": ("lz4", [16 * MIB], "a chunk of .* cannot hold 16777216, at most 8388608"),
     "zstd, 16 MiB": ("zstd", [16 * MIB], "a chunk of .* cannot hold 16777216"),
+    "another compression": ("brotli", [1000], "the compression 'brotli'"),
     "lz4, chunks that are each allowed": ("lz4", [3 * MIB // 9 * 9] * 20, "expand to more than .* 32 times its size"),
 }
 
 
 @pytest.mark.parametrize(("compression", "sizes", "refusal"), BOMBS.values(), ids=BOMBS)
-def test_a_log_that_expands_without_bound_is_refused_at_once(
+def test_a_log_that_expands_without_bound_or_not_at_all_is_refused_at_once(
     compression: str, sizes: list[int], refusal: str, tmp_path: Path
 ) -> None:
     path, contents = tmp_path / "bomb.mcap", bytearray(MCAP0_MAGIC)
