@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --duration
 # Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
-.PHONY: help lock setup demo test test-compiled test-vm test-page wheel mutants dst claims lint docs docs-links man clean
+.PHONY: help lock setup demo test test-compiled test-vm test-page watch-pictures wheel mutants dst claims lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -39,6 +39,9 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 
 test-page: .venv/test  ## open the live page in a headless Chromium, at the widths of a phone and of a desk; needs chromium-driver
 	$(BIN)/python -m pytest -v verification/browser $(ARGS)
+
+watch-pictures: .venv/test  ## draw the screen of `watch` for its page
+	@$(BIN)/python -m tests.command_line.watch.pictures docs
 
 wheel: .venv/test  ## build the wheel, check its files, and walk the demo from it in an empty environment
 	@$(BIN)/python -m verification.wheel

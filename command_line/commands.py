@@ -41,7 +41,7 @@ GAIT: Mapping[str, Command] = {
     "simulate": ("gait.simulate", "Walk a gait file in simulated mud."),
 }
 COMMANDS: Mapping[str, Command] = {
-    "status": ("operation.operation.status", "Print the state of the robot."),
+    "status": ("operation.status.status", "Print the state of the robot."),
     "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
     "gait": (GAIT, "Check and simulate gaits of your own."),

@@ -1,11 +1,13 @@
-"""The errors that end a command: their messages, and the exit status of each."""
+"""The errors that end a command: their messages, and the exit status of each.
+
+The modules that define them are imported once one is caught, since most commands do without most of them.
+"""
 
 import sys
 from collections.abc import Sequence
 
 from command_line import exit_codes
 from command_line.screen import complain
-from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, NotPermittedError
 
 NO_DAEMON = (
     "{}. Start it with 'systemctl start mudskipper', or name its socket with --socket. "
@@ -48,6 +50,8 @@ def report(problem: Exception) -> int:
 
 def explain(problem: Exception) -> tuple[Sequence[str], int]:
     """Return the messages and the exit status of an error. Raise one that is not expected again."""
+    from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, NotPermittedError
+
     text = str(problem)
     match problem:
         case CommandError():
@@ -67,7 +71,7 @@ def explain(problem: Exception) -> tuple[Sequence[str], int]:
 
 def _explain_files_and_buses(problem: Exception) -> tuple[Sequence[str], int]:
     from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError
-    from firmware_host.buses import BusError  # imports too much for `status`
+    from firmware_host.buses import BusError
     from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError, why_not
     from logs.files.log_error import LogError
 

@@ -6,13 +6,12 @@ interleaved run a bare interpreter took 32 ms, with argparse 56 ms, with typer 1
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from command_line.json_output import JSON, Answer
 from experiments.study.option import REQUIRED, DeclaredOption, Option, declared_options
 
-METAVARS = {int: "N", float: "X", Path: "FILE", str: "NAME"}
+METAVARS = {"int": "N", "float": "X", "Path": "FILE", "str": "NAME"}  # by name: pathlib is slow to import
 SHOWN_DEFAULTS = 4  # of a repeatable option
 
 
@@ -40,9 +39,13 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
 
 def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
     """Return the values that the operator gave to parameters of the function, and computed defaults."""
-    values = {each.parameter: getattr(options, each.parameter, None) for each in declared_options(function)}
-    given = {name: value for name, value in values.items() if value is not None}
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    given = {}
+    for each in declared_options(function):
+        value, default = getattr(options, each.parameter, None), each.option.default
+        if value is not None:
+            value = default() if default and value is default else value
+            given[each.parameter] = tuple(value) if isinstance(value, list) else value
+    return given
 
 
 def flag_of(parameter: str) -> str:
@@ -53,15 +56,14 @@ def flag_of(parameter: str) -> str:
 def _keywords(declared: DeclaredOption) -> dict[str, Any]:
     """Return the keywords of argparse's `add_argument`."""
     option, is_required = declared.option, declared.default is REQUIRED
-    default = declared.default if option.default else argparse.SUPPRESS
-    keywords: dict[str, Any] = {"help": _help(declared), "default": default}
+    keywords: dict[str, Any] = {"help": _help(declared), "default": option.default or argparse.SUPPRESS}
     if declared.type is bool:
         return keywords | {"action": "store_true"}
     keywords["type"] = _parser(declared.type, option)
     if declared.choices:
         keywords |= {"choices": declared.choices, "metavar": option.metavar or None}
     else:
-        keywords["metavar"] = option.metavar or option.unit.upper() or METAVARS.get(declared.type, "VALUE")
+        keywords["metavar"] = option.metavar or option.unit.upper() or METAVARS.get(declared.type.__name__, "VALUE")
     if not declared.named:
         at_least_none, at_least_one = ("*", "+") if declared.repeatable else ("?", None)
         # argparse would parse a default of text, SUPPRESS too

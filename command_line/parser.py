@@ -6,15 +6,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
 from typing import Any, NoReturn
 
 from command_line import exit_codes
 from command_line.commands import COMMANDS, Command, Found
 from command_line.function_options import add_function_options
 from command_line.screen import complaints
-from control.computing.suggestion import suggestion
 
+vars(argparse)["_"] = str  # its messages stay English, as MISSING is; looking for a translation takes 2 ms
 MISSING = "the following arguments are required"  # as argparse says it
 
 
@@ -57,7 +56,7 @@ class Parser(argparse.ArgumentParser):
 
     def add_commands(self, commands: Mapping[str, Command], title: str = "action") -> None:
         """Add a parser for each command."""
-        choices = self.add_subparsers(dest=title, required=True, metavar=title)
+        choices = self.add_subparsers(dest=title, required=True, metavar=title, prog=self.prog)
         for name, (target, text) in commands.items():
             choices.add_parser(name, help=text.partition("\n")[0], description=text, target=target)
 
@@ -67,6 +66,8 @@ class Parser(argparse.ArgumentParser):
         self._require_command_first(sys.argv[1:] if args is None else args)
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
+            from control.computing.suggestion import suggestion
+
             options = [name for action in self._actions for name in action.option_strings]
             self.error(f"unrecognized arguments: {' '.join(unknown)}; {suggestion(unknown[0], options)}")
         return found, unknown
@@ -83,6 +84,8 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is no choice with the choices, the most similar first."""
         if action.choices is not None and value not in action.choices:
+            from control.computing.suggestion import suggestion
+
             existing = suggestion(str(value), map(str, action.choices))
             raise argparse.ArgumentError(action, f"there is no {value!r}; {existing}")
 
@@ -112,6 +115,8 @@ class PrintCompletion(argparse.Action):
     """Prints a completion script for a shell and ends."""
 
     def __call__(self, parser: argparse.ArgumentParser, _: object, shell: object, __: object = None) -> NoReturn:
+        from pathlib import Path
+
         import shtab
 
         from control.records import JOINTS
@@ -120,7 +125,7 @@ class PrintCompletion(argparse.Action):
             if offers := getattr(action, "offers", ""):
                 words = " ".join(offers.format(joint=joint) for joint in JOINTS)
                 action.complete = shtab.cmd(f"printf '%s\\n' {words}")  # type: ignore[attr-defined]
-            elif action.type is Path:
+            elif action.type is Path or action.metavar == "PATH":
                 action.complete = shtab.FILE  # type: ignore[attr-defined]
         print(shtab.complete(parser, str(shell)))
         parser.exit()

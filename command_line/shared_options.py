@@ -1,54 +1,39 @@
-"""Options that several commands have: the daemon's socket, the configuration, JSON."""
+"""Options that several commands have: the daemon's socket, JSON, a seed."""
 
-import os
-from pathlib import Path
+from os import PathLike, environ
+from os.path import basename, exists
 from typing import Annotated, TypeAlias
 
-from drivers.can.run_folder import find_run_folder
-from experiments.study.option import Option, OptionError
+from experiments.study.option import Option
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 SIMULATED = "robot"  # the name that `mudskipper simulate` has without --bus
 
 
-def default_socket() -> Path:
+def default_socket() -> str:
     """Return $MUDSKIPPER_SOCKET, else the service's socket; where no service runs, that of `mudskipper simulate`."""
-    given = os.environ.get("MUDSKIPPER_SOCKET")
-    return Path(given) if given else _of_service_or_simulation(Path(DEFAULT_SOCKET))
+    return environ.get("MUDSKIPPER_SOCKET") or service_or_simulated(DEFAULT_SOCKET)
 
 
-def default_configuration() -> Path:
-    """Return the daemon's configuration; where there is none, that of `mudskipper simulate`."""
-    return _of_service_or_simulation(Path(DEFAULT_CONFIG))
+def service_or_simulated(path: str) -> str:
+    """Return the path of a service's file; where there is none, that of `mudskipper simulate` if that exists."""
+    if not exists(path):
+        from drivers.can.run_folder import find_run_folder  # a robot's own computer does without it
 
-
-def _of_service_or_simulation(path: Path) -> Path:
-    folder = None if path.exists() else find_run_folder()
-    simulated = folder / SIMULATED / path.name if folder else path
-    return simulated if simulated.exists() else path
-
-
-def interface_name(text: str) -> str:
-    """Accept an interface of python-can. Raises argparse.ArgumentTypeError for another one."""
-    from drivers.can.can_port import interface_problem  # slow to import
-
-    if problem := interface_problem(text):
-        raise OptionError(f"{text}: {problem}")
-    return text
+        simulated = f"{find_run_folder()}/{SIMULATED}/{basename(path)}"
+        return simulated if exists(simulated) else path
+    return path
 
 
 Json: TypeAlias = Annotated[bool, Option("print JSON for programs")]
 Socket: TypeAlias = Annotated[
-    Path,
+    str | PathLike[str],
     Option(
         "Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
         metavar="PATH",
+        parse=str,
         default=default_socket,
     ),
-]
-RobotConfiguration: TypeAlias = Annotated[
-    Path,
-    Option("of the robot (default: that of the daemon, or of the simulated robot)", default=default_configuration),
 ]
 Seed: TypeAlias = Annotated[int, Option("of the simulation's noise")]

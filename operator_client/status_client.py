@@ -1,17 +1,18 @@
 """A client of the status socket; it imports only the standard library and msgpack, so that commands start quickly."""
 
-import socket
 import struct
+from _socket import AF_UNIX, SO_PEERCRED, SO_SNDTIMEO, SOCK_STREAM, SOL_SOCKET, socket  # `socket` is slow to import
 from contextlib import suppress
-from pathlib import Path
-from typing import Any
+from os import PathLike, fspath
+from os.path import splitext
+from typing import Any, Self
 
 import msgpack
 
 from firmware_host.sockets.rpc import LONGEST_REQUEST, NOT_PERMITTED, REQUEST, TOO_LONG
-from firmware_host.sockets.socket_file import operators_path
 
 ANSWER_S = 5.0
+OPERATORS = "-operators"  # in the name of their own socket, as the daemon has it
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 CLOSED = "it is ending, or made room for another client; try again"
 SILENT = "'systemctl status mudskipper' shows more"
@@ -35,19 +36,23 @@ class CallRefusedError(Exception):
 
 
 class StatusClient:
-    """Connects through the operators' own socket where this user may, else through the one for every user."""
+    """Connects through the operators' own socket where this user may, else through the one for every user.
 
-    def __init__(self, path: Path, timeout_s: float = ANSWER_S) -> None:
-        self._path = path
+    A `with` statement closes it. Raises NoDaemonError and NotPermittedError.
+    """
+
+    def __init__(self, path: str | PathLike[str], timeout_s: float = ANSWER_S) -> None:
+        self._path = fspath(path)
+        stem, ending = splitext(self._path)
         self._number = 0
         self._unpacker = msgpack.Unpacker(raw=False)
         try:
-            self._socket = _connected(operators_path(path), timeout_s)
+            self._socket = _connected(f"{stem}{OPERATORS}{ending}", timeout_s)
         except OSError:
             self._socket = self._connect_as_anyone(timeout_s)
         self._socket.settimeout(timeout_s)
 
-    def _connect_as_anyone(self, timeout_s: float) -> socket.socket:
+    def _connect_as_anyone(self, timeout_s: float) -> socket:
         try:
             return _connected(self._path, timeout_s)
         except PermissionError as problem:
@@ -60,7 +65,7 @@ class StatusClient:
     def daemon_pid(self) -> int:
         """Return the process that created the socket, as the kernel reports it."""
         size = CREDENTIALS.size
-        return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
+        return int(CREDENTIALS.unpack(self._socket.getsockopt(SOL_SOCKET, SO_PEERCRED, size))[0])
 
     def call(self, method: str, **params: Any) -> Any:
         """Return the result of a method.
@@ -110,13 +115,19 @@ class StatusClient:
     def close(self) -> None:
         self._socket.close()
 
+    def __enter__(self) -> Self:
+        return self
 
-def _connected(path: Path, timeout_s: float) -> socket.socket:
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _connected(path: str, timeout_s: float) -> socket:
     """Return a connected socket; raises OSError. A full queue is waited for: with Python's own timeout it would not."""
-    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection = socket(AF_UNIX, SOCK_STREAM)
     try:
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6)))
-        connection.connect(str(path))
+        connection.setsockopt(SOL_SOCKET, SO_SNDTIMEO, TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6)))
+        connection.connect(path)
     except BaseException:
         connection.close()
         raise

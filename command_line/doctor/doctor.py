@@ -137,8 +137,7 @@ def _ask_daemon(socket: Path, configuration: Configuration) -> tuple[int | None,
     """Return the daemon's process id, and the findings about itself and its drives."""
     pid = None
     try:
-        client = StatusClient(socket)
-        with closing(client):
+        with StatusClient(socket) as client:
             pid = client.daemon_pid
             return pid, list(examine_daemon(client.call("status"), software_version(), configuration))
     except tuple(UNANSWERED) as problem:

@@ -7,8 +7,8 @@ from command_line import exit_codes
 from command_line.drives.opened_buses import FD_RATE_KBIT_S, OpenedBus, opened_buses
 from command_line.errors import usage_error
 from command_line.json_output import Answer
+from command_line.robot_options import RobotConfiguration, interface_name
 from command_line.screen import GREEN, RED, YELLOW, coloured, watched
-from command_line.shared_options import RobotConfiguration, interface_name
 from control.computing.suggestion import suggestion
 from drivers.bench.search import SearchResult, expectation_problems, id_problems
 from drivers.drive import DriveParameters

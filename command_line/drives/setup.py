@@ -11,8 +11,8 @@ from command_line.drives.backup_file import Backup, default_path, read_backup, w
 from command_line.drives.joint_setup import JointSetup, bus_problems, lines_of, read_documents, read_joint
 from command_line.drives.opened_buses import OpenedBus, opened_buses
 from command_line.errors import CommandError, usage_error
+from command_line.robot_options import RobotConfiguration
 from command_line.screen import GREEN, RED, coloured, watched
-from command_line.shared_options import RobotConfiguration
 from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.settings_change import Names, Outcome, change_settings

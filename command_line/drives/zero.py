@@ -13,8 +13,8 @@ from typing import Annotated, NamedTuple
 from command_line import exit_codes
 from command_line.drives.opened_buses import opened_buses
 from command_line.errors import CommandError, usage_error
+from command_line.robot_options import RobotConfiguration
 from command_line.screen import complain, watched
-from command_line.shared_options import RobotConfiguration
 from control.computing.suggestion import suggestion
 from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives

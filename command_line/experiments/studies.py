@@ -239,7 +239,7 @@ def make_session(
     if simulated:
         operator = AutomaticOperator(prompt.report)
         return Session(results, operator, progress.show, simulated=True, program=program)
-    return Session(results, prompt, progress.show, socket, program=program)
+    return Session(results, prompt, progress.show, Path(socket) if socket else None, program=program)
 
 
 def make_workers(

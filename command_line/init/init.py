@@ -14,7 +14,7 @@ from command_line.errors import usage_error
 from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.key_reference import Key, configuration_keys
 from command_line.init.new_file import NewRobot, drive_keys, new_file
-from command_line.shared_options import interface_name
+from command_line.robot_options import interface_name
 from control.computing.suggestion import suggestion
 from control.geometry import FlipperGeometry
 from control.plate_outline import Corner

@@ -7,7 +7,6 @@ present configuration and list its keys. An earlier package is the way back.
 import os
 import sys
 from collections.abc import Collection, Iterator
-from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -92,10 +91,10 @@ def key_changes(before: Collection[str], after: Collection[str]) -> Iterator[str
     yield from (f"{key} is new" for key in new)
 
 
-def energised_mode(socket: Path) -> str:
+def energised_mode(socket: Socket) -> str:
     """Return the mode in which drives have torque; empty where they have none, or no daemon runs."""
     try:
-        with closing(StatusClient(socket)) as client:
+        with StatusClient(socket) as client:
             mode = str(client.call("status")["mode"])
     except NoDaemonError:
         return ""

@@ -48,7 +48,7 @@ def live(
 ) -> int:
     _require_address(host, port)
     try:
-        audience, address = _open_page(host, port, socket, name) if page else _open_viewers(host, port)
+        audience, address = _open_page(host, port, Path(socket), name) if page else _open_viewers(host, port)
     except ModuleNotFoundError:
         raise CommandError(
             "viewers need foxglove-sdk and rosbags: install mudskipper with its extra 'live', or use --page"
@@ -57,7 +57,7 @@ def live(
         raise CommandError(f"{host}:{port}: {problem.strerror or problem}") from None
     print(f"Serving on {address}. Ctrl-C ends.", flush=True)
     try:
-        pass_on(RowSubscription(stream_path(socket)), audience)
+        pass_on(RowSubscription(stream_path(Path(socket))), audience)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would interrupt the end of the server's threads
         return exit_codes.OK

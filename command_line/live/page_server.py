@@ -14,7 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Collection, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -254,7 +254,7 @@ class _Handler(BaseHTTPRequestHandler):
 def ask_status(status_socket: Path) -> tuple[HTTPStatus, bytes]:
     """Return the daemon's status as JSON, or why it would not take a stop and show that the drives confirm it."""
     try:
-        with closing(StatusClient(status_socket, ANSWER_S)) as client:
+        with StatusClient(status_socket, ANSWER_S) as client:
             return HTTPStatus.OK, json.dumps(client.call("status")).encode()
     except (CallRefusedError, NotPermittedError, NoDaemonError) as problem:
         return HTTPStatus.CONFLICT, str(problem).encode()

@@ -21,10 +21,10 @@ from experiments.study.values import folder
 from firmware_host.log.log_folder import COPIED, DONE, ENDING, PRESERVED, log_files, mark_of
 
 ROBOTS_LOGS = "/var/lib/mudskipper/logs"
-SILENT_S = 30  # of the network: the copy ends
+SILENT_S = 30  # of the network: the copy ends; rsync alone takes what it still sends for a sign of life
 PLACES = [f"--include=/{name}/" for name in (DONE, PRESERVED)]  # of finished logs, here as there
 RSYNC = ("rsync", "--recursive", "--times", f"--timeout={SILENT_S}", "--partial-dir=.partial")
-SSH = f"--rsh=ssh -o ConnectTimeout={SILENT_S}"
+SSH = f"--rsh=ssh -o ConnectTimeout={SILENT_S} -o ServerAliveInterval={SILENT_S // 3} -o ServerAliveCountMax=3"
 
 
 def pull(

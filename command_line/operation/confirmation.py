@@ -5,8 +5,6 @@ idle drive. In every other case the torque is unknown, and the operator has to c
 """
 
 import time
-from contextlib import closing
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line import exit_codes
@@ -72,10 +70,10 @@ def _confirm(client: StatusClient, method: str) -> Ended:
         time.sleep(POLL_S)
 
 
-def end_motion(path: Path, method: str) -> Ended:
+def end_motion(path: Socket, method: str) -> Ended:
     """Request a stop or a disarm over a connection of its own, and wait for the drives."""
     try:
-        with closing(StatusClient(path, ANSWER_S)) as client:
+        with StatusClient(path, ANSWER_S) as client:
             accepted = client.call(method)
             try:
                 return _confirm(client, method)
@@ -96,19 +94,19 @@ def disarm(*, socket: Socket) -> Answer:
     return _end("disarm", socket)
 
 
-def _end(command: str, socket: Path) -> Answer:
+def _end(command: str, socket: Socket) -> Answer:
     ended = end_motion(socket, command)
     if ended.status != exit_codes.OK:
         complain(ended.text, TORQUE_UNKNOWN)
     return mode_answer(command, ended.mode, ended.notice, ended.status)
 
 
-def send_order(path: Path, method: str, **params: Any) -> str:
+def send_order(path: Socket, method: str, **params: Any) -> str:
     """Send an order over a connection of its own, and return what became of it: none waits for another."""
     if method in ENDINGS:
         return end_motion(path, method).answer
     try:
-        with closing(StatusClient(path, ANSWER_S)) as client:
+        with StatusClient(path, ANSWER_S) as client:
             answer = client.call(method, **params)
             return f"{method}: {answer if isinstance(answer, str) else answer['time']}"
     except (CallRefusedError, NotPermittedError) as problem:

@@ -4,10 +4,10 @@ from typing import Annotated, Any
 
 from command_line.errors import usage_error
 from command_line.json_output import Answer
-from command_line.operation.operation import connect
 from command_line.shared_options import Socket
 from experiments.reports.text_tables import table
 from experiments.study.option import Option
+from operator_client.status_client import StatusClient
 
 
 def fail(
@@ -26,7 +26,7 @@ def fail(
         raise usage_error("fail --list takes neither COMPONENT nor KIND")
     if not list and (component is None or kind is None):
         raise usage_error("fail needs a COMPONENT and a KIND, or --list")
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         if not list:
             failing = client.call("fail", component=component, kind=kind, for_s=seconds)
             return Answer(failing, failing_table(failing))

@@ -15,7 +15,7 @@ from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.operation.attended_walk import LEASE_S, RENEWAL_S, LiveLine
 from command_line.operation.confirmation import stop
-from command_line.operation.operation import LEAST_DEPTH_CM, connect
+from command_line.operation.operation import LEAST_DEPTH_CM
 from command_line.operation.pads import (
     ARM,
     DEAD_MAN,
@@ -154,7 +154,7 @@ def joy(
     """Drive until Ctrl-C. A robot that is driven is stopped at the end, and every drive has to confirm it."""
     drive = HandDrive(partial(StatusClient, socket), None if depth is None else depth / 100.0)
     status, ended = exit_codes.OK, ""
-    with opened_pad(device, keyboard) as pad, connect(socket) as client:
+    with opened_pad(device, keyboard) as pad, StatusClient(socket) as client:
         try:
             follow(pad, drive, client)
         except KeyboardInterrupt:

@@ -1,12 +1,9 @@
-"""Sends an operator's commands to the running daemon.
-
-It imports the standard library and msgpack only, so these commands start fast.
-"""
+"""Sends an operator's commands to the running daemon."""
 
 import argparse
 import time
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import suppress
 from math import isfinite, radians
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -14,29 +11,14 @@ from typing import Annotated, Any, TypeAlias
 from command_line import exit_codes
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import Answer
+from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
-from command_line.robot_text import (
-    MILD,
-    MODE_STYLES,
-    WARNING,
-    Part,
-    Report,
-    cause_text,
-    consequences_text,
-    drive_cells,
-    machine_lines,
-    mode_word,
-    notices,
-    plain,
-    position_text,
-    stride_text,
-    style_of,
-    unheard_text,
-)
+from command_line.robot_text import MILD, Report
 from command_line.screen import GREEN, RED, coloured, complain
 from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
+from control.computing.suggestion import suggestion
+from control.records import JOINTS
 from drivers.can.run_folder import find_run_folder
-from experiments.reports.text_tables import table
 from experiments.study.option import Option
 from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, StatusClient
 
@@ -48,18 +30,6 @@ LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
 
 TakeOver: TypeAlias = Annotated[bool, Option("take the lease from a program that holds it")]
-
-
-def connect(socket: Path) -> closing[StatusClient]:
-    """Return a client that is closed at the end of a `with` block. Raises NoDaemonError and NotPermittedError."""
-    return closing(StatusClient(socket))
-
-
-def status(*, socket: Socket) -> Answer:
-    with connect(socket) as client:
-        report = client.call("status")
-    failed = report["mode"] in ("fault", "damping")
-    return Answer(report, status_text(report), exit_codes.UNHEALTHY if failed else exit_codes.OK)
 
 
 def arm(
@@ -117,25 +87,20 @@ def walk(
     described["water"] = "" if water is None else f"{water:g}"
     params |= {key: value for key, value in described.items() if value}
     if gait:
-        from firmware_host.configuration.gait_file import as_json, gait_document  # `status` does without it
+        from firmware_host.configuration.gait_file import as_json, gait_document  # slow to import
 
         params["gait"] = as_json(gait_document(gait))
     if depth:
         depths_m = [each / 100.0 for each in depth]
         params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}
     if attended:
-        from command_line.operation.attended_walk import attend  # `status` does without it
-
-        with connect(socket) as client:
+        with StatusClient(socket) as client:
             return attend(client, json, params)
     return _change_mode("walk", "walking", socket, params)
 
 
 def joint_angle(text: str) -> tuple[str, float]:
     """Parse a joint and its angle in degrees."""
-    from control.computing.suggestion import suggestion  # `status` does without them
-    from control.records import JOINTS
-
     joint, _, angle_deg = text.partition("=")
     if joint and joint not in JOINTS:
         raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; {suggestion(joint, JOINTS)}")
@@ -158,7 +123,7 @@ def move(
     joints = [joint for joint, _ in angles]
     if twice := next((joint for joint in joints if joints.count(joint) > 1), None):
         raise usage_error(f"{twice} is named twice")
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         try:
             angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in angles}
             client.call("move", take_over=take_over, **angles_rad)
@@ -178,13 +143,13 @@ def clear(
     socket: Socket,
     zero: Annotated[bool, Option("also confirm the angles of joints whose zero may have shifted")] = False,
 ) -> Answer:
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         client.call("clear", **({"zero": True} if zero else {}))
         report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
     messages = [fault["message"] for fault in stopping_faults(report)]
     if messages or not _is_at_rest(report):
         raise _refusal(
-            f"the cause is still there: {' '.join(messages) or report['mode']}{_reset_advice(socket, report)}"
+            f"the cause is still there: {' '.join(messages) or report['mode']}{_reset_advice(Path(socket), report)}"
         )
     return mode_answer("clear", report["mode"])
 
@@ -212,9 +177,9 @@ def stopping_faults(report: Report) -> list[Report]:
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
-def _change_mode(command: str, mode: str, socket: Path, params: dict[str, Any], waiting_s: float = 0.0) -> Answer:
+def _change_mode(command: str, mode: str, socket: Socket, params: dict[str, Any], waiting_s: float = 0.0) -> Answer:
     """Send the command, again for so long as it is refused, and wait for the mode that it asks for."""
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         _call_patiently(client, command, params, waiting_s)
         report = _poll(client, lambda status: status["mode"] in (mode, "fault"), ARMING_S)
     if report["mode"] == "fault":
@@ -255,12 +220,12 @@ def check(
 ) -> Answer:
     """Ask the daemon; where none runs, check what it would need."""
     try:
-        with connect(socket) as client:
+        with StatusClient(socket) as client:
             items = client.call("check")
     except DroppedError:
         raise
     except NoDaemonError as problem:
-        from command_line.doctor.doctor import check_without_daemon  # imports too much for `status`
+        from command_line.doctor.doctor import check_without_daemon  # slow to import
 
         items = check_without_daemon(config, str(problem))
     texts = [
@@ -282,30 +247,3 @@ def _check_text(item: Report, following: list[str]) -> str:
         overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force CHECK'"
         lines.append(f"       -> {item['fix']}{overruled}")
     return "\n".join(lines)
-
-
-def status_text(report: Report) -> str:
-    style = MODE_STYLES.get(mode_word(report), "bold")
-    position = f"{stride_text(report)}, {position_text(report)}"
-    parts: list[Part] = [(f"{report['robot']}: ", ""), (mode_word(report), style), (f", {position}\n", "")]
-    if report["mode"] == "boot":
-        parts.append((f"{unheard_text(report) or 'every drive was heard'}\n", WARNING))
-    for cause in report["causes"]:
-        consequences = consequences_text(cause)
-        lines = [cause_text(cause), *filter(None, [consequences and f"    and {consequences}"])]
-        parts.append(("\n".join([*lines, f"    -> {cause['what_to_do']}\n"]), style_of(cause)))
-    parts += [(f"warning: {notice}\n", WARNING) for notice in notices(report)]
-    drives = [{head: cell for head, (cell, _) in drive_cells(drive).items()} for drive in report["drives"]]
-    parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
-    for name, (text, style) in machine_lines(report):
-        parts += [(f"\n{name:7}", ""), (text, style)]
-    return plain(parts) + _quota_line(report["log"])
-
-
-def _quota_line(log: Report) -> str:
-    """Return what the quota deletes; empty where there is no log or the daemon is older."""
-    if not log["path"] or "quota_bytes" not in log:
-        return ""
-    from firmware_host.log.log_folder import quota_text  # not needed by the other commands
-
-    return f"\nquota  {quota_text(Path(log['path']).parent.parent, log['quota_bytes'], log['min_free_fraction'])}"

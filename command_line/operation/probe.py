@@ -24,7 +24,7 @@ def probe(
     config: Annotated[Path | None, Option("of the daemon, to write the height and its error to")] = None,
 ) -> Answer:
     """Touch the mud lightly at five sweeps of each flipper, and write what was found into the log."""
-    robot, progress = DaemonRobot(socket), Progress("touches")
+    robot, progress = DaemonRobot(Path(socket)), Progress("touches")
     leave = robot.leave_holding
     try:
         text = robot.configuration.text

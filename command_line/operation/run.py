@@ -18,7 +18,7 @@ from typing import Annotated, Any
 from command_line.errors import usage_error
 from command_line.json_output import Answer
 from command_line.operation.attended_walk import LawError, attend
-from command_line.operation.operation import TakeOver, connect
+from command_line.operation.operation import TakeOver
 from command_line.shared_options import Json, Socket
 from experiments.study.option import Option
 from operator_client.status_client import CallRefusedError, StatusClient
@@ -37,7 +37,7 @@ def run(
 ) -> Answer:
     """Walk by a control law of your own; the robot stops with this command, and with a law that fails or is late."""
     chosen = load_law(law)
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         read = client.call("status")["strides_closed"]
 
         def order(client: StatusClient) -> None:

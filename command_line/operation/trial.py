@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from command_line.errors import usage_error
 from command_line.json_output import Answer
-from command_line.operation.operation import connect
 from command_line.shared_options import Socket
 from experiments.reports.text_tables import table
 from experiments.study.option import Option
+from operator_client.status_client import StatusClient
 
 
 def key_value(text: str) -> tuple[str, str]:
@@ -41,7 +41,7 @@ def trial(
     """Show how walks are described, or change the defaults, which hold until they are changed again."""
     if bool(values) != (action == "set"):
         raise usage_error("'mudskipper trial set KEY=VALUE ...' changes the defaults, 'mudskipper trial' shows them")
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         report = client.call("trial_set", **dict(values)) if values else client.call("trial")
     return Answer(report, trial_text({"default": report["defaults"], "this walk, or the last": report["present"]}))
 
@@ -55,6 +55,6 @@ def note(
     """Write a note or a marker into the log, and print its time."""
     if not (text or mark):
         raise usage_error("a note needs a text, such as 'mudskipper note \"rained last night\"'")
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         written: dict[str, Any] = client.call("mark" if mark else "note", text=text)
     return Answer(written, f"{written['time']}  {written['stamp_s']:.4f} s by the robot's clock")

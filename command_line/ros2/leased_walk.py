@@ -8,7 +8,7 @@ operator, a fault, `stop`) is final until the client has paused: its repeated ca
 import threading
 import time
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from command_line import exit_codes
@@ -59,7 +59,7 @@ class LeasedWalk:
 
     def clear(self) -> str:
         """Clear faults, refused while another program has the lease."""
-        with closing(StatusClient(self._socket, ANSWER_S)) as client:
+        with StatusClient(self._socket, ANSWER_S) as client:
             answer = str(client.call("clear", lease_s=LEASE_S))
             client.call("release")
             return answer

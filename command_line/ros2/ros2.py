@@ -6,7 +6,6 @@ does. It takes no set-points. A walk is under the daemon's lease (leased_walk.py
 
 import re
 from collections.abc import Callable
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -52,18 +51,18 @@ def ros2(
         with connect(router) as session:
             node = RosNode(session, domain, namespace, hashed=distribution != "humble")
             audience = RosAudience(session, node, partial(_read_map, socket))
-            for name, act in _services(socket, allow_drive).items():
+            for name, act in _services(Path(socket), allow_drive).items():
                 node.serve(name, partial(_attempt, act))
             node.watch_others()
             place = f"{namespace or '/'} in domain {domain} by {router}"
             print(f"ROS 2 {distribution}: {place}. Files for the laptop: {LAPTOP_FILES}. Ctrl-C ends.", flush=True)
-            pass_on(RowSubscription(stream_path(socket)), audience)
+            pass_on(RowSubscription(stream_path(Path(socket))), audience)
     except KeyboardInterrupt:
         return exit_codes.OK
 
 
-def _read_map(socket: Path) -> list[dict[str, Any]]:
-    with closing(StatusClient(socket)) as client:
+def _read_map(socket: Socket) -> list[dict[str, Any]]:
+    with StatusClient(socket) as client:
         return client.read_map()
 
 

@@ -157,7 +157,7 @@ class WatchApp(App[int]):
     def _body(self) -> ComposeResult:
         with Vertical(id="body"):
             yield Static(id="walk")
-            columns = [((f"{flipper} (N/cm³)", 18), ("", 3), ("", 9)) for flipper in self._flippers]
+            columns = [((f"{flipper} (N/cm³)", 26), ("", 3), ("", 9)) for flipper in self._flippers]
             yield Rows([("", 4), *(column for each in columns for column in each)], "mud")
             yield Static(id="forces")
             yield Static(id="strip")

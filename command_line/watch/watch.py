@@ -4,16 +4,17 @@ import os
 import sys
 from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 from command_line import exit_codes
 from command_line.operation.confirmation import send_order
-from command_line.operation.operation import connect
 from command_line.screen import complain
 from command_line.shared_options import Socket
 from command_line.watch.feed import Feed
 from command_line.watch.plain_lines import print_lines
 from experiments.study.option import Option
+from operator_client.status_client import StatusClient
 
 SCREEN_PERIOD_S, LINES_PERIOD_S = 0.1, 1.0
 
@@ -27,16 +28,16 @@ def watch(
     socket: Socket,
 ) -> int:
     """Begin only with a daemon that answers; later the screen survives its restart."""
-    with connect(socket) as client:
+    with StatusClient(socket) as client:
         flippers = list(client.call("status")["loads"])
     if _can_show_screen(lines):
         from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
 
         period_s = period or SCREEN_PERIOD_S
-        app = WatchApp(Feed(socket, period_s), flippers, period_s, partial(send_order, socket))
+        app = WatchApp(Feed(Path(socket), period_s), flippers, period_s, partial(send_order, socket))
         return app.run(mouse=False) or exit_codes.OK
     period_s = period or LINES_PERIOD_S
-    print_lines(Feed(socket, period_s), period_s)
+    print_lines(Feed(Path(socket), period_s), period_s)
     return exit_codes.OK
 
 

@@ -33,7 +33,7 @@ class Option(NamedTuple):
     parse: Callable[[str], Any] | None = None  # the text of a value, or of all joined ones; raises OptionError
     above: float = -inf  # a lower bound that is not allowed itself
     choices: Sequence[str] = ()  # that are not known before the program runs, as those of a Literal are
-    default: Callable[[], Any] | None = None  # computes the default when the command line is read
+    default: Callable[[], Any] | None = None  # computes it where the command line does not give a value
     without_value: str | None = None  # the value of an option that is given without one
     name: str = ""  # where it differs from the parameter's
     alternative: str = ""  # options with the same word here exclude each other
@@ -121,7 +121,7 @@ def _declared(name: str, kind: Any, option: Option, default: Any, named: bool) -
         option=option,
         type=type(choices[0]) if choices else kind,
         choices=choices,
-        default=option.default() if option.default else default,
+        default=option.default or default,
         repeatable=repeatable,
         named=named,
     )

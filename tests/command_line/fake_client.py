@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from command_line.operation import confirmation, operation
+from command_line.operation import confirmation, failing, joy, operation, run, status, trial
 from operator_client.status_client import StatusClient
 
 Answer = Callable[[str], Any]  # of a method
@@ -38,7 +38,7 @@ def answer_with(patch: pytest.MonkeyPatch, answer: Answer) -> None:
     def connect(path: Path, timeout_s: float = 0.0) -> FakeClient:
         return FakeClient(answer)
 
-    for module in (operation, confirmation):
+    for module in (confirmation, failing, joy, operation, run, status, trial):
         patch.setattr(module, "StatusClient", connect)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -184,7 +184,7 @@ def driven_by(monkeypatch: pytest.MonkeyPatch, bench: Bench, controls: Callable[
     @contextmanager
     def opened_pad(device: str, keyboard: bool) -> Iterator[Pad]:
         def read(now_s: float) -> Controls:
-            with closing(StatusClient(bench.socket)) as client:
+            with StatusClient(bench.socket) as client:
                 return controls(client.call("status"))
 
         yield read

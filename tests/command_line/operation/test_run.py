@@ -50,7 +50,7 @@ def daemon(monkeypatch: pytest.MonkeyPatch) -> WalkOfTwoStrides:
     client = WalkOfTwoStrides(Path())
     monkeypatch.setattr(attended_walk, "POLL_S", 0.0)
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    monkeypatch.setattr("command_line.operation.operation.StatusClient", lambda socket: client)
+    monkeypatch.setattr("command_line.operation.run.StatusClient", lambda socket: client)
     return client
 
 

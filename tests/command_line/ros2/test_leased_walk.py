@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ class Called:
         return self.walk.walk()
 
     def operate(self, method: str, **params: Any) -> None:
-        with closing(StatusClient(self.socket)) as operator:
+        with StatusClient(self.socket) as operator:
             operator.call(method, **params)
 
     def wait_for(self, *modes: Mode) -> None:
@@ -60,7 +59,7 @@ def test_each_call_renews_the_walk_and_silence_stops_the_robot(called: Called) -
 def test_an_operator_who_takes_the_robot_over_keeps_it(called: Called) -> None:
     called.call()
     called.wait_for(Mode.WALKING)
-    with closing(StatusClient(called.socket)) as operator:
+    with StatusClient(called.socket) as operator:
         operator.call("depth", depth_m=0.03, take_over=True, lease_s=10.0)
         for _ in range(3):
             with pytest.raises(CallRefusedError, match="taken over"):

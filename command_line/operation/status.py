@@ -1,0 +1,60 @@
+"""`mudskipper status`: prints the state of the robot."""
+
+from command_line import exit_codes
+from command_line.json_output import Answer
+from command_line.robot_text import (
+    MODE_STYLES,
+    WARNING,
+    Part,
+    Report,
+    cause_text,
+    consequences_text,
+    drive_cells,
+    machine_lines,
+    mode_word,
+    notices,
+    plain,
+    position_text,
+    stride_text,
+    style_of,
+    unheard_text,
+)
+from command_line.shared_options import Socket
+from experiments.reports.text_tables import table
+from operator_client.status_client import StatusClient
+
+
+def status(*, socket: Socket) -> Answer:
+    with StatusClient(socket) as client:
+        report = client.call("status")
+    failed = report["mode"] in ("fault", "damping")
+    return Answer(report, status_text(report), exit_codes.UNHEALTHY if failed else exit_codes.OK)
+
+
+def status_text(report: Report) -> str:
+    style = MODE_STYLES.get(mode_word(report), "bold")
+    position = f"{stride_text(report)}, {position_text(report)}"
+    parts: list[Part] = [(f"{report['robot']}: ", ""), (mode_word(report), style), (f", {position}\n", "")]
+    if report["mode"] == "boot":
+        parts.append((f"{unheard_text(report) or 'every drive was heard'}\n", WARNING))
+    for cause in report["causes"]:
+        consequences = consequences_text(cause)
+        lines = [cause_text(cause), *filter(None, [consequences and f"    and {consequences}"])]
+        parts.append(("\n".join([*lines, f"    -> {cause['what_to_do']}\n"]), style_of(cause)))
+    parts += [(f"warning: {notice}\n", WARNING) for notice in notices(report)]
+    drives = [{head: cell for head, (cell, _) in drive_cells(drive).items()} for drive in report["drives"]]
+    parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
+    for name, (text, style) in machine_lines(report):
+        parts += [(f"\n{name:7}", ""), (text, style)]
+    if report["log"]["path"]:
+        parts.append((f"\nquota  {_quota_text(report['log'])}", ""))
+    return plain(parts)
+
+
+def _quota_text(log: Report) -> str:
+    """Return which logs are deleted, and when; `doctor`, which may read their folder, also counts them."""
+    quota_gb, free_percent = log["quota_bytes"] / 1e9, 100.0 * log["min_free_fraction"]
+    limits = [f"more than {quota_gb:g} GB of logs"] * (quota_gb > 0.0)
+    limits += [f"less than {free_percent:g} % of the disk free"] * (free_percent > 0.0)
+    rule = "the oldest copied log is deleted, uncopied ones last"
+    return f"at {' or '.join(limits)} {rule}" if limits else "no log is deleted"

@@ -1,0 +1,26 @@
+"""Options of commands that read a robot's configuration or open its buses."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+from command_line.shared_options import DEFAULT_CONFIG, service_or_simulated
+from drivers.can.can_port import interface_problem
+from experiments.study.option import Option, OptionError
+
+
+def default_configuration() -> Path:
+    """Return the daemon's configuration; where there is none, that of `mudskipper simulate`."""
+    return Path(service_or_simulated(DEFAULT_CONFIG))
+
+
+def interface_name(text: str) -> str:
+    """Accept an interface of python-can. Raises argparse.ArgumentTypeError for another one."""
+    if problem := interface_problem(text):
+        raise OptionError(f"{text}: {problem}")
+    return text
+
+
+RobotConfiguration: TypeAlias = Annotated[
+    Path,
+    Option("of the robot (default: that of the daemon, or of the simulated robot)", default=default_configuration),
+]
