@@ -23,7 +23,8 @@ from simulation.mud.track import Track
 from verification.benchmark import Report, measure_in_turns, run_benchmark
 
 MODEL = Path(__file__).parents[2] / "command_line/ros2/mudskipper_msgs/urdf/mudskipper.urdf"
-GROUND = '<collision><origin xyz="0 0 -0.09"/><geometry><box size="9 9 0.1"/></geometry></collision>'
+GROUND_M = -0.064  # its surface, from the joints; level plates are 1.4 cm above it
+GROUND = '<collision><origin xyz="0 0 -0.114"/><geometry><box size="9 9 0.1"/></geometry></collision>'
 INERTIAL = '<inertial><mass value="0.1"/><inertia ixx="4e-4" iyy="4e-4" izz="4e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
 AT = [1, 0, 3, 2]  # the robot's joints in the order of the model
 Stepped = tuple[Callable[[], Any], Callable[[list[float]], object]]  # the joints' angles and velocities, and a step
@@ -36,11 +37,12 @@ def torques_nm(time_s: float, angles_rad: Any, velocities_rad_s: Any) -> list[fl
     return [max(-0.8, min(8.0 * (target - angle) - 0.1 * velocity, 0.8)) for target, angle, velocity in motions]
 
 
-def write_model(path: Path) -> str:
-    """Write the model with ground and masses; of its visible boxes the plates collide."""
+def write_model(path: Path, ground: bool) -> str:
+    """Write the model with masses; of its visible boxes the plates collide, and its base may have the ground."""
     model = ElementTree.parse(MODEL)
     base, *links = model.findall("link")
-    base.append(ElementTree.fromstring(GROUND))
+    if ground:
+        base.append(ElementTree.fromstring(GROUND))
     for link in links:
         link.append(ElementTree.fromstring(INERTIAL))
         for plate in link.findall("visual")[1:]:
@@ -57,7 +59,7 @@ def plant_stepped(_: Path) -> Stepped:
 def mujoco_stepped(path: Path) -> Stepped:
     import mujoco
 
-    model = mujoco.MjModel.from_xml_path(write_model(path))
+    model = mujoco.MjModel.from_xml_path(write_model(path, ground=True))
     model.opt.timestep = STEP_S
     data = mujoco.MjData(model)
 
@@ -74,8 +76,8 @@ def pybullet_stepped(path: Path) -> Stepped:
     bullet.connect(bullet.DIRECT)
     bullet.setTimeStep(STEP_S)
     bullet.setGravity(0.0, 0.0, -9.81)
-    colliding = bullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
-    robot = bullet.loadURDF(write_model(path), useFixedBase=True, flags=colliding)
+    bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE), basePosition=[0.0, 0.0, GROUND_M])
+    robot = bullet.loadURDF(write_model(path, ground=False), useFixedBase=True)
     bullet.setJointMotorControlArray(robot, AT, bullet.VELOCITY_CONTROL, forces=[0.0] * 4)  # its own motors
 
     def step(nm: list[float]) -> None:
