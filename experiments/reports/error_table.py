@@ -14,6 +14,7 @@ from pandas import DataFrame
 
 NORMAL_95 = 1.96
 KEYS = ["setup", "mud", "coefficient", "method"]
+SHOWN = ["median", "bias", "coverage", "strides", "bounds", "bounds_hold", "not_valid"]  # of many groups
 Row = dict[str, Any]
 
 
@@ -24,6 +25,12 @@ def error_rows(evaluations: DataFrame) -> list[Row]:
     """
     groups = evaluations.groupby(KEYS, sort=False) if len(evaluations) else ()
     return [dict(zip(KEYS, key, strict=True)) | _errors(group) for key, group in groups]
+
+
+def error_frame(evaluations: DataFrame, *keys: str) -> DataFrame:
+    """Return the errors of the groups that differ in these keys alone, pooled over the others."""
+    pooled = evaluations.assign(**{key: "" for key in KEYS if key not in keys})
+    return DataFrame(error_rows(pooled))[[*keys, *SHOWN]]
 
 
 def _errors(group: DataFrame) -> Row:

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from control.controller import WalkOrder
 from control.records import TWO_FLIPPERS, Rig
 from drivers.drive_types import DEFAULT
 from experiments.robot.log_copies import cut_log
@@ -17,12 +18,15 @@ from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import Level
 from logs.files.log_reader import Log, read_log
 from operator_client.status_client import CallRefusedError
+from simulation.harness.direct import Direct
 from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.local_setup import configuration_template
 from simulation.harness.lockstep import Lockstep
+from simulation.mud.track import Track
 
 CALLER = Caller(1, Peer(os.getpid(), os.geteuid(), frozenset()), Level.DRIVE)
+RESTING_S = 1.0  # until the flippers lie still, as those of every robot do before it is armed
 
 
 def simulated_configuration(
@@ -35,6 +39,15 @@ def simulated_configuration(
     text = configuration_template(rig).format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
     lines = [f"{line}\n{drive}" if drive and line.startswith("[drive.") else line for line in text.splitlines()]
     return parse_configuration(with_drive_type("\n".join([*lines, "", sections]), drive_type))
+
+
+def start_walk(configuration: Configuration, track: Track, seed: int, order: WalkOrder, **rest: Any) -> Direct:
+    """Return a robot that walks, for studies of mud. Raises RuntimeError where it does not start."""
+    robot = Direct(configuration, track, seed, **rest)
+    robot.run_for(RESTING_S)
+    robot.arm()
+    robot.walk(order)
+    return robot
 
 
 class LockstepRobot:

@@ -13,11 +13,10 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from estimation.knowledge import SHEAR_LAW, STROKE_LAW
 from experiments.reports.depth_law import fit_depth_law
-from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import Track
@@ -51,9 +50,8 @@ def study(
 def walk(strength_pa: float, seed: int, depths_m: list[float], strides: int) -> dict[str, Any]:
     """Return the depth law of each coefficient over the strides of both flippers."""
     mud = Track([(1000.0, Clay("mud", strength_pa))])
-    robot = Lockstep(simulated_configuration(), mud, seed=seed, disturbances=TRACKWAY)
-    robot.arm()
-    robot.walk(WalkOrder(depths_m[0], adaptive=False, strides=strides, depths_m=tuple(depths_m)))
+    order = WalkOrder(depths_m[0], adaptive=False, strides=strides, depths_m=tuple(depths_m))
+    robot = start_walk(simulated_configuration(), mud, seed, order, disturbances=TRACKWAY)
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, STRIDE_S * strides)
     estimates = [closed.estimate for closed in robot.loop.learning.strides]
     return {name: _law([getattr(each, name) for each in estimates]) for name in LAWS}

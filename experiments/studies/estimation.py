@@ -18,7 +18,7 @@ from pandas import DataFrame
 
 from control.records import COEFFICIENTS
 from estimation.estimation_parameters import EstimationParameters
-from experiments.reports.coefficient_table import compared_frame, compared_rows
+from experiments.reports.coefficient_table import compared_frame
 from experiments.reports.error_table import error_rows, plate_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.text_tables import number
@@ -26,7 +26,7 @@ from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
-from experiments.trials.load_cell_truth import true_coefficients
+from experiments.trials.load_cell_truth import true_strides
 from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import (
     LATENCY_S,
@@ -35,10 +35,9 @@ from experiments.trials.trial import (
     TORQUE_ERROR,
     WALKING,
     Setup,
-    replay_trial,
+    compared_trial,
     run_trial,
 )
-from firmware_host.operator.reports import stride_report
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track
@@ -183,24 +182,13 @@ def run_part(
     track = Track([(ENDLESS_M if len(clays) == 1 else COMPARTMENT_M, clay) for clay in clays])
     own = SETUPS[setup] if world["repeats"] else replace(SETUPS[setup], row_period_s=0.0)
     trial = run_trial(own, track, world["disturbances"], strides, seed, world["torque_error"], world["latency_s"])
-    leaning, upright = (
-        {
-            (truth.flipper, truth.index): true_coefficients(
-                truth, trial.configuration.geometry, world["disturbances"].relaxation, own.gait.pause_s, is_upright
-            )
-            for truth in trial.truths
-        }
-        for is_upright in (False, True)
-    )
+    known = trial.truths, trial.configuration, world["disturbances"].relaxation
+    leaning = true_strides(*known)
     if len(clays) > 1:
         return {"evaluated": [], "transitions": transitions_of(trial, leaning)}
-    evaluated: list[Row] = []
+    plates, evaluated = (leaning, true_strides(*known, upright=True)), list[Row]()
     for names, with_pose, parameters in methods_of(own):
-        for stride, _ in replay_trial(trial, parameters, with_pose):
-            keys = names | {"mud": clays[0].name, "trial": f"{seed} {stride.flipper}"}
-            number = stride.flipper, stride.index
-            rows = compared_rows(stride_report(stride), leaning.get(number, {}), upright.get(number, {}), **keys)
-            evaluated += [row for row in rows if row["truth"] is not None]
+        evaluated += compared_trial(trial, parameters, plates, with_pose, mud=clays[0].name, **names)
     return {"evaluated": evaluated, "transitions": []}
 
 

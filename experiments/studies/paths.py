@@ -20,15 +20,16 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import COEFFICIENTS, UNKNOWN, Estimate, StrideEstimate
 from estimation.knowledge import MudKnowledge
-from experiments.reports.error_table import NORMAL_95
-from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.reports.coefficient_table import compared_frame, compared_rows
+from experiments.reports.error_table import error_frame
+from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.load_cell_truth import REVERSAL_FRACTION, true_coefficients
 from firmware_host.configuration.gait_file import gait_document, read_gait
+from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track
@@ -57,18 +58,14 @@ def study(
         for seed in range(1, seeds + 1)
     ]
     walks = trials.run(walk, rows)
-    found = DataFrame([row for each in walks["estimates"] for row in each])
+    estimates = [row for each in walks["estimates"] for row in each]
+    found = compared_frame(estimates).assign(predicted=[row["predicted"] for row in estimates])
     speeds = walks.groupby(["gait", "strength_pa"], sort=False)[["speed_cm_s", "stuck"]].mean().reset_index()
-    errors = DataFrame(
-        _summary(keys, rows) for keys, rows in found.groupby(["gait", "strength_pa", "coefficient"], sort=False)
-    )
-    pooled = DataFrame(_summary(keys, rows) for keys, rows in found.groupby(["gait", "coefficient"], sort=False))
-    units = {"strength_pa": "Pa", "median_percent": "%", "prediction_percent": "%", "inside_percent": "%"}
     return Result(
         tables=[
             Table("speeds", "Advance by gait", {"strength_pa": "Pa", "speed_cm_s": "cm/s"}, speeds),
-            Table("errors", "Errors by gait and mud", units, errors),
-            Table("pooled", "Errors by gait, all muds", units, pooled),
+            Table("errors", "Errors by gait and mud", {}, errors_of(found, "setup", "mud", "coefficient")),
+            Table("pooled", "Errors by gait, all muds", {}, errors_of(found, "setup", "coefficient")),
         ],
         figures=[Figure("paths", "Estimate over truth by gait; the band is 10 %.", lambda: draw(found))],
     )
@@ -76,37 +73,32 @@ def study(
 
 def walk(gait: str, strength_pa: float, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
     """Return the speed of a walk, and its estimates with their truths and predictions."""
-    configuration = simulated_configuration()
     clay = Clay(f"{strength_pa:g} Pa", strength_pa)
+    order = WalkOrder(depth_m, adaptive=False, strides=strides, gait=read_gait(gait_document(gait)))
     noisy = replace(NONE, current_noise_a=LAB.current_noise_a)
-    robot = Lockstep(configuration, Track([(1000.0, clay)]), seed=seed, disturbances=noisy)
-    robot.arm()
+    robot = start_walk(simulated_configuration(), Track([(1000.0, clay)]), seed, order, disturbances=noisy)
     begun_s = robot.now_s
-    robot.walk(WalkOrder(depth_m, adaptive=False, strides=strides, gait=read_gait(gait_document(gait))))
     robot.run_until(lambda: robot.loop.mode is not Mode.WALKING, LONGEST_STRIDE_S * strides)
     closed = [each.estimate for each in robot.loop.learning.strides]
     speed_cm_s = 100.0 * robot.robot.plant.body_m / (robot.now_s - begun_s)
-    estimates = list(_compared(closed, clay, configuration.geometry, gait=gait, strength_pa=strength_pa))
-    return {"speed_cm_s": speed_cm_s, "stuck": sum(not each.released for each in closed), "estimates": estimates}
+    rows = _compared(closed, clay, robot.loop.configuration.geometry, setup=gait, method="default", trial=seed)
+    return {"speed_cm_s": speed_cm_s, "stuck": sum(not each.released for each in closed), "estimates": list(rows)}
 
 
 def _compared(
     closed: Sequence[StrideEstimate], clay: Clay, geometry: FlipperGeometry, **keys: Any
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each coefficient of each stride."""
+    """Yield the rows of each stride, with the logarithm of predicted over estimated value."""
     knowledge = MudKnowledge()
     for stride in closed:
         remembered = knowledge.mud_estimate.of(stride.flipper)
         truths = true_coefficients(_truth_of(stride, clay), geometry, 0.0, 0.0, upright=False)
-        for name in COEFFICIENTS:
-            estimate, before = getattr(stride, name), getattr(remembered, name)
-            row = keys | {"coefficient": name, "bound": estimate.at_least}
-            is_value = estimate.valid and not estimate.at_least and name in truths
-            row["ratio"] = estimate.value / truths[name] if is_value else UNKNOWN
-            row["normal"] = (estimate.value - truths[name]) / estimate.std_error if is_value else UNKNOWN
-            predicts = is_value and before is not None and not before.at_least
-            row["predicted"] = log(before.at(estimate.depth_m)[0] / estimate.value) if predicts else UNKNOWN
-            yield row
+        for row in compared_rows(stride_report(stride), truths, mud=clay.name, **keys):
+            before, row["predicted"] = getattr(remembered, row["coefficient"]), UNKNOWN
+            if row["kind"] == "value" and before is not None and not before.at_least:
+                row["predicted"] = log(before.at(row["depth_m"])[0] / row["value"])
+            if row["truth"] is not None:
+                yield row
         knowledge.update([stride])
 
 
@@ -128,29 +120,22 @@ def _truth_of(stride: StrideEstimate, clay: Clay) -> StrideTruth:
     )
 
 
-def _summary(keys: Any, rows: DataFrame) -> dict[str, Any]:
-    """Return what a table shows of the rows of one gait and coefficient."""
-    names = ("gait", "strength_pa", "coefficient") if len(keys) == 3 else ("gait", "coefficient")
-    values = rows["ratio"].dropna()
-    predicted = rows["predicted"].dropna()
-    return dict(zip(names, keys, strict=True)) | {
-        "values": len(values),
-        "bounds": int(rows["bound"].sum()),
-        "median_percent": 100.0 * (float(values.median()) - 1.0),
-        "error_percent": 100.0 * float((values - 1.0).abs().median()),
-        "inside_percent": 100.0 * float((rows["normal"].dropna().abs() < NORMAL_95).mean()),
-        "prediction_percent": 100.0 * float(np.sqrt((predicted**2).mean())),
-    }
+def errors_of(found: DataFrame, *keys: str) -> DataFrame:
+    """Return the errors by these keys, and the RMS error of the predictions."""
+    squares = found.assign(square=found["predicted"] ** 2).groupby(list(keys), sort=False)["square"].mean()
+    errors = error_frame(found, *keys).assign(prediction=squares.pow(0.5).to_numpy())
+    return errors.rename(columns={"setup": "gait"})
 
 
 def draw(found: DataFrame) -> Drawing:
     figure = Drawing()
     panels = figure.subplots(1, len(COEFFICIENTS), sharey=True)
-    gaits = list(found["gait"].unique())
+    gaits, values = list(found["setup"].unique()), found[found["kind"] == "value"]
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
         panel.axhspan(0.9, 1.1, alpha=0.2)
         for place, gait in enumerate(gaits):
-            ratios = found[(found["gait"] == gait) & (found["coefficient"] == name)]["ratio"].dropna()
+            own = values[(values["setup"] == gait) & (values["coefficient"] == name)]
+            ratios = own["value"] / own["truth"]
             panel.plot(np.full(len(ratios), place), ratios, ".", alpha=0.4)
         panel.set_xticks(range(len(gaits)), gaits, rotation=45)
         panel.set(title=name)

@@ -67,7 +67,7 @@ def study(
     ]
     trials.require_same(**walking_world())
     walked = trials.run(walk_in_mud, [*adaptive, *constant_rows(strengths_pa, seeds)])  # the longest first
-    muds = [_swept_mud(strength_pa, walks) for strength_pa, walks in walked.groupby("strength_pa")]
+    muds = [{"strength_pa": strength_pa} | sweep_of(walks) for strength_pa, walks in walked.groupby("strength_pa")]
     settings = {
         "methods": methods,
         "seeds": seeds,
@@ -76,18 +76,20 @@ def study(
         "disturbances": asdict(TRACKWAY),
     }
     title = "Speed at the best constant depth, and where each method settles (after its second stride)"
-    table = Table("sweep", title, {}, DataFrame([_row(mud) for mud in muds]))
+    table = Table(
+        "sweep", title, {}, DataFrame([{"strength": f"{mud['strength_pa']:g} Pa"} | sweep_row(mud) for mud in muds])
+    )
     return Result([table], [Figure("sweep", "", partial(draw, muds))], {"strengths": muds, "settings": settings})
 
 
-def _swept_mud(strength_pa: float, walks: DataFrame) -> Summary:
+def sweep_of(walks: DataFrame) -> Summary:
+    """Evaluate the walks on one ground: at constant depths, and by each method."""
     constant = walks[walks["method"].isna()]
     speeds = mean_speeds_cm_s(constant)
     best = best_depth(speeds)
     return {
-        "strength_pa": strength_pa,
         "constant": [
-            _count(walks_in(own), STARTING) | {"depth_cm": round(100.0 * depth_m, 4), "mean": round(speeds[depth_m], 3)}
+            {"depth_cm": round(100.0 * depth_m, 4), "mean": round(speeds[depth_m], 3)} | _count(walks_in(own), STARTING)
             for depth_m, own in constant.groupby("depth_m")
         ],
         "best": best,
@@ -114,23 +116,21 @@ def _count(walks: Sequence[Walk], skipped: int) -> Summary:
     counted = [walk.strides[skipped:] for walk in walks]
     return {
         "strides": sum(len(strides) for strides in counted),
-        "failures": count_failures(counted, arm_m()),
+        "failures": (failures := count_failures(counted, arm_m())),
+        "failed": sum(failures.values()),
         "faults": sorted({walk.fault for walk in walks if walk.fault}),
     }
 
 
-def _row(mud: Summary) -> dict[str, str]:
+def sweep_row(mud: Summary) -> dict[str, str]:
+    """Return the best constant depth and each method as a row of a table."""
     cells = {f"{name}: depth, speed (cm/s), % of best, failed": _cell(each) for name, each in mud["methods"].items()}
     best = mud["best"]
-    return {
-        "strength": f"{mud['strength_pa']:g} Pa",
-        "best depth": f"{best['depth_cm']:g} cm",
-        "speed (cm/s)": f"{best['mean']:.2f}",
-    } | cells
+    return {"best depth": f"{best['depth_cm']:g} cm", "speed (cm/s)": f"{best['mean']:.2f}"} | cells
 
 
 def _cell(settled: Summary) -> str:
-    failed, fault = sum(settled["failures"].values()), ", fault" if settled["faults"] else ""
+    failed, fault = settled["failed"], ", fault" if settled["faults"] else ""
     fraction = settled["fraction_of_best"]
     percent = "-" if fraction is None else f"{100.0 * fraction:3.0f} %"
     return (
@@ -203,6 +203,6 @@ def _draw_fraction(panel: Axes, settled: DataFrame, method: str, colour: str, po
     line = TEXT if colour == "white" else colour
     panel.plot("kpa", "percent", "-o", data=settled, color=line, markerfacecolor=colour, markersize=6, label=method)
     for each in settled.itertuples():
-        if failed := sum(each.failures.values()):
-            panel.annotate(f"{failed}/{each.strides}", (each.kpa, each.percent), color=line, fontsize="x-small",
+        if each.failed:
+            panel.annotate(f"{each.failed}/{each.strides}", (each.kpa, each.percent), color=line, fontsize="x-small",
                            textcoords="offset points", xytext=(0, points), ha="center")  # fmt: skip

@@ -23,11 +23,12 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.parameters.adaptation_parameters import Method
 from control.parameters.recovery_parameters import RecoveryParameters
+from experiments.robot.lockstep_robot import start_walk
 from experiments.trackway.walk import StrideRecord, Walk, WalkedStride, speed_m_s, tick_of, walk_of
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
-from simulation.harness.lockstep import Lockstep, plant_of
+from simulation.harness.lockstep import plant_of
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import TRACKWAY, Disturbances
 from simulation.mud.track import Track
@@ -83,15 +84,15 @@ def walk_by(
 
     `plant` changes parameters of the simulated robot's body. Raises RuntimeError where the robot does not start.
     """
-    robot = robot_of(method)
-    lockstep = Lockstep(robot, track, seed, disturbances=disturbances, plant=plant_of(robot, disturbances, **plant))
-    lockstep.arm()
-    lockstep.walk(WalkOrder(robot.adaptation.initial_depth_m if method else depth_m, adaptive=bool(method)))
+    configuration = robot_of(method)
+    order = WalkOrder(configuration.adaptation.initial_depth_m if method else depth_m, adaptive=bool(method))
+    body = plant_of(configuration, disturbances, **plant)
+    robot = start_walk(configuration, track, seed, order, disturbances=disturbances, plant=body)
     record = StrideRecord(lambda position_m: track.ground_at(position_m).name)
-    while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
-        lockstep.step()
-        record.update(tick_of(lockstep))
-    fault = lockstep.loop.fault
+    while robot.loop.mode is Mode.WALKING and not done(record.strides):
+        robot.step()
+        record.update(tick_of(robot))
+    fault = robot.loop.fault
     return Walk(record.strides, fault.message if fault else "")
 
 

@@ -9,10 +9,12 @@ one lean stands for a growing one, and the cell reads 4 % more k_p at 3 cm, 13 %
 is 1 to 6 % more than the upright plate's at each of these depths.)
 """
 
+from collections.abc import Iterable, Mapping
 from math import cos, fsum, isfinite, sin
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
+from firmware_host.configuration.configuration import Configuration
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.test_rig.joint_cell import JointCell, measure_stroke
 from simulation.test_rig.load_cell import LoadCell, measure_shear
@@ -30,6 +32,15 @@ OTHER_PLATE = (
 
 
 Truth = dict[str, float]  # N/m³ by coefficient, without those whose stroke did not happen
+FlipperTruths = Mapping[tuple[str, int], Truth]  # by flipper and stride
+
+
+def true_strides(
+    strides: Iterable[StrideTruth], configuration: Configuration, relaxation: float, upright: bool = False
+) -> FlipperTruths:
+    """Return the coefficients of each stride of a robot in mud with this relaxation."""
+    known = configuration.geometry, relaxation, configuration.gait.pause_s, upright
+    return {(stride.flipper, stride.index): true_coefficients(stride, *known) for stride in strides}
 
 
 def true_coefficients(

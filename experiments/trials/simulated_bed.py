@@ -16,22 +16,23 @@ from experiments.robot.bench_robot import disarm
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.study.notebook import Notebook
 from experiments.study.prompt import GO_ON, Operator
-from experiments.trials.load_cell_truth import true_coefficients
+from experiments.trials.load_cell_truth import true_strides
 from experiments.trials.mud_trials import Bench, PlannedTrial, Truths
 from experiments.trials.trial import TORQUE_ERROR
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.motion_capture_parameters import OF_THE_PAPER, MotionCaptureParameters
+from simulation.harness.direct import Direct
 from simulation.harness.file_recorder import FileRecorder
-from simulation.harness.lockstep import Lockstep, drives_of
+from simulation.harness.lockstep import drives_of
 from simulation.mud.disturbances import LAB, drive_changes
 from simulation.mud.track import Track
 
 SEED = 1  # of everything random on a simulated bench
 
 
-class ReferenceLockstep(Lockstep):
-    """A lockstep robot with a virtual load cell in every stride since the last walk began."""
+class ReferenceRobot(Direct):
+    """A robot with a virtual load cell in every stride since the last walk began."""
 
     def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
         super().__init__(configuration, track, seed, **rest)
@@ -50,13 +51,9 @@ class ReferenceLockstep(Lockstep):
 
     def readings(self, flipper: str) -> Truths:
         """Return what a load cell with the plate as the flipper carries it reads in each stride."""
-        configuration = self.loop.configuration
-        relaxation, pause_s = self.robot.plant.parameters.disturbances.relaxation, configuration.gait.pause_s
-        return {
-            stride.index: true_coefficients(stride, configuration.geometry, relaxation, pause_s, upright=False)
-            for stride in self._truths
-            if stride.flipper == flipper
-        }
+        own = [stride for stride in self._truths if stride.flipper == flipper]
+        truths = true_strides(own, self.loop.configuration, self.robot.plant.parameters.disturbances.relaxation)
+        return {index: truth for (_, index), truth in truths.items()}
 
 
 def simulated_bench(
@@ -77,7 +74,7 @@ def simulated_bench(
         drives[joint] = replace(drive, torque_constant_error=random.gauss(0.0, TORQUE_ERROR))
     logs = (notebook.path.with_name(f"simulated-{number:03d}.mcap") for number in range(1, 1000))
     recorder = FileRecorder(next(path for path in logs if not path.exists()), configuration)
-    lockstep = ReferenceLockstep(
+    lockstep = ReferenceRobot(
         configuration,
         track,
         SEED,

@@ -11,14 +11,14 @@ from typing import Any
 from pandas import DataFrame
 
 from control.mud_estimate import MudEstimate
-from experiments.trials.load_cell_truth import Truth
+from experiments.trials.load_cell_truth import FlipperTruths
 from experiments.trials.trial import Trial, replay_trial
 from simulation.body.reference_sensor import StrideTruth
 
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 
 
-def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], Truth]) -> list[dict[str, Any]]:
+def transitions_of(trial: Trial, truths: FlipperTruths) -> list[dict[str, Any]]:
     """Return each step of a flipper from one mud into the next, with the strides until the estimate followed.
 
     They are None where it did not follow before the next border or the end. `truths` are by flipper and stride.
@@ -35,9 +35,7 @@ def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], Truth]) -> lis
     return transitions
 
 
-def _is_close(
-    stride: StrideTruth, truths: Mapping[tuple[str, int], Truth], estimates: Mapping[int, MudEstimate]
-) -> bool:
+def _is_close(stride: StrideTruth, truths: FlipperTruths, estimates: Mapping[int, MudEstimate]) -> bool:
     estimate, truth = estimates[stride.index].of(stride.flipper).k_p, truths[stride.flipper, stride.index].get("k_p")
     if estimate is None or truth is None:
         return False

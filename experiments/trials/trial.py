@@ -1,7 +1,7 @@
 """A simulated trial as an estimator meets it: every tick's samples, and the true motion of every stride.
 
-Robot, drives and mud run in lockstep with the daemon's own loop, frames included; the samples are those of the loop's
-estimator. So any number of methods can be evaluated on the same trial.
+Robot, motors and mud run in step with the daemon's own loop; the samples are those of the loop's estimator. So any
+number of methods can be evaluated on the same trial.
 
 The samples may have a latency between current and angle, as a log has whose drives report one later than the other. It
 disturbs the samples, not the control. The authors' rows change angles and currents together, so a difference within a
@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
 from random import Random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
@@ -25,11 +25,14 @@ from drivers.drive_types import DEFAULT
 from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import MudEstimator
-from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.reports.coefficient_table import compared_rows
+from experiments.robot.lockstep_robot import simulated_configuration, start_walk
+from experiments.trials.load_cell_truth import FlipperTruths
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.gait_file import PROTOCOLS
+from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.disturbances import Disturbances
 from simulation.mud.track import Track
 
@@ -73,6 +76,7 @@ class Trial:
     drives: tuple[FlipperDrive, ...]  # as the estimator knows them
     samples: Sequence[Sample]
     truths: Sequence[StrideTruth]
+    seed: int
 
 
 def configuration_of(setup: Setup, drive_type: str = DEFAULT) -> Configuration:
@@ -102,26 +106,25 @@ def run_trial(
     largest latency between current and angle.
     """
     configuration = configuration_of(setup)
-    lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
-    lockstep.arm()
-    lockstep.walk(WalkOrder(setup.depth_m, adaptive=False))
+    order = WalkOrder(setup.depth_m, adaptive=False)
+    robot = start_walk(configuration, track, seed, order, disturbances=disturbances, fixed_base=setup.fixed_base)
     reference, samples, truths = StrokeReference(configuration.rig), list[Sample](), list[StrideTruth]()
-    first, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
-    while len(truths) < len(configuration.rig.flippers) * strides and lockstep.now_s < end_s:
-        lockstep.step()
-        samples.append(_sample_of(lockstep))
-        truths += reference.step(PERIOD_S, lockstep.robot.plant, samples[-1].phase)
+    first, end_s = _sample_of(robot), robot.now_s + strides * LONGEST_STRIDE_S
+    while len(truths) < len(configuration.rig.flippers) * strides and robot.now_s < end_s:
+        robot.step()
+        samples.append(_sample_of(robot))
+        truths += reference.step(PERIOD_S, robot.robot.plant, samples[-1].phase)
     samples = with_latency(samples, Random(f"latency {seed}").uniform(-latency_s, latency_s))
     random, drives = Random(seed), list(configuration.flipper_drives)
     for i, drive in enumerate(drives):
         known = {name: getattr(drive, name) * (1.0 + random.gauss(0.0, torque_error)) for name in CONSTANTS}
         drives[i] = drive._replace(**known)
-    return Trial(configuration, tuple(drives), rows_of(first, samples, setup.row_period_s), truths)
+    return Trial(configuration, tuple(drives), rows_of(first, samples, setup.row_period_s), truths, seed)
 
 
-def _sample_of(lockstep: Lockstep) -> Sample:
-    loop = lockstep.loop
-    return Sample(lockstep.now_s, loop.target.phase, loop.states, loop.body)
+def _sample_of(robot: Direct) -> Sample:
+    loop = robot.loop
+    return Sample(robot.now_s, loop.target.phase, loop.states, loop.body)
 
 
 def with_latency(samples: Sequence[Sample], current_late_s: float) -> list[Sample]:
@@ -162,3 +165,19 @@ def replay_trial(
         known = sample if with_pose else sample._replace(body=BodyPose())
         for stride in estimator.update(*known).strides:
             yield stride, estimator.mud_estimate
+
+
+def compared_trial(
+    trial: Trial,
+    parameters: EstimationParameters,
+    plates: Sequence[FlipperTruths],
+    with_pose: bool = True,
+    **keys: Any,
+) -> list[dict[str, Any]]:
+    """Return the rows of an estimator's coefficients that a load cell reads with the leaning plate, the first."""
+    rows: list[dict[str, Any]] = []
+    for stride, _ in replay_trial(trial, parameters, with_pose):
+        number = stride.flipper, stride.index
+        readings = [plate.get(number, {}) for plate in plates]
+        rows += compared_rows(stride_report(stride), *readings, trial=f"{trial.seed} {stride.flipper}", **keys)
+    return [row for row in rows if row["truth"] is not None]

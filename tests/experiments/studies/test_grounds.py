@@ -6,11 +6,12 @@ import pytest
 
 from control.geometry import FlipperGeometry
 from experiments.studies.grounds import GROUNDS, disturbances_on, study
+from experiments.trackway.walk import Walk, WalkedStride
 from simulation.mud.disturbances import TRACKWAY
 from simulation.test_rig.load_cell import LoadCell
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
-CM_S = {1.5: 1.0, 3.0: 4.0, 5.0: 2.0, 0.0: 3.8}
+STEP_M = {0.015: 0.1, 0.03: 0.4, 0.05: 0.2, 0.0: 0.38}
 
 
 def force_n(ground: str, depth_m: float) -> float:
@@ -34,15 +35,18 @@ def test_a_ground_has_no_disturbance_twice_and_dry_sand_does_not_cling() -> None
 
 
 def test_the_study_compares_the_choice_with_the_best_constant_depth_and_counts_intervals() -> None:
-    def measure(ground: str, seed: int, depth_cm: float = 0.0, setup: str = "") -> dict[str, Any]:
+    def measure(ground: str, seed: int, setup: str = "", depth_m: float = 0.0, **row: Any) -> dict[str, Any]:
         if not setup:
-            return {"cm_s": CM_S[depth_cm], "stuck": int(depth_cm == 5.0), "strides": 6, "chosen_cm": depth_cm or 2.8}
+            step_m = STEP_M[depth_m]
+            return Walk([WalkedStride("", 0.0, depth_m or 0.028, step_m, 1.0, 0.0)] * 5, "").entry
         named = {"mud": ground, "setup": setup, "method": "default", "trial": str(seed), "coefficient": "k_s"}
         values = {"kind": "value", "value": 1.0 + 0.1 * seed, "truth": 1.0, "std_error": 0.1, "repeatability": 0.1}
         return {"rows": [named | values]}
 
     result = study(SyntheticTrials(measure), ground=("crust",), depth=(1.5, 3.0, 5.0), seeds=1, estimates=2)
-    speeds, errors = (table.rows for table in result.tables)
-    assert speeds.iloc[0][["of the best", "stuck, constant", "stuck, chosen"]].tolist() == ["95 %", "1/18", "0/6"]
+    _, errors, pooled = (table.rows for table in result.tables)
+    swept = result.json()["speeds"]["crust"]
+    assert swept["best"]["depth_cm"] == 3.0 and swept["methods"]["default"]["fraction_of_best"] == 0.95
     assert errors[["coverage", "strides"]].drop_duplicates().to_numpy().tolist() == [[0.5, 2]]
+    assert pooled["strides"].tolist() == [4]
     result.figures[0].draw()

@@ -71,7 +71,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Row]]:
         truths = [stride(flipper, i, mud) for i, mud in enumerate(muds) for flipper in FLIPPERS]
         replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, depth_m)) for i, k_p in enumerate(estimates)]
         monkeypatch.setattr(experiments.trials.transitions, "replay_trial", lambda trial, parameters: replayed)
-        trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
+        trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths, seed=1)
         return transitions_of(
             trial, {(truth.flipper, truth.index): {"k_p": K_P[truth.ground.name]} for truth in truths}
         )
