@@ -114,6 +114,9 @@ class Plug:
         self.port = ReopeningPort(lambda: self._open(wire), wait=True)
         self.wire = wire
         drives.ports["left"] = self.port
+        for monitor in robot.loop.fault_monitor._buses:
+            if monitor._port is wire:
+                monitor._port = self.port
         for index, (port, receivers) in enumerate(drives._receivers):
             if port is wire:
                 drives._receivers[index] = (self.port, receivers)
