@@ -151,5 +151,10 @@ def test_the_page_learns_whether_a_stop_would_reach_the_robot(
     assert len(asked) < len(answers)  # pages share the daemon's answer
 
 
+def test_a_stop_without_a_daemon_says_to_cut_the_power(page: PageServer) -> None:
+    status, text = post(page, X_Mudskipper="stop")
+    assert status == 409 and "cut motor power" in text
+
+
 def test_a_configuration_of_another_version_still_draws_a_robot() -> None:
     assert robot_facts("no TOML ][")["flipper_length_m"] > 0.0

@@ -12,13 +12,14 @@ import pytest
 
 from command_line import exit_codes
 from command_line.operation import joy as joy_module
-from command_line.operation.joy import AGAIN_S, HandDrive
+from command_line.operation.joy import AGAIN_S, HandDrive, joy
 from command_line.operation.pads import (
     ARM,
     DEAD_MAN,
     DEEPER,
     DEVICE_KEYS,
     FIRST_REPEAT_S,
+    QUIT,
     REPEAT_S,
     SHALLOWER,
     STOP,
@@ -190,6 +191,22 @@ def driven_by(monkeypatch: pytest.MonkeyPatch, bench: Bench, controls: Callable[
         yield read
 
     monkeypatch.setattr(joy_module, "opened_pad", opened_pad)
+
+
+def test_releasing_the_dead_man_stops_the_robot_as_a_lost_lease(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+
+    def controls(report: Report) -> Controls:
+        first, walked = not seen, "walking" in seen
+        seen.append(report["mode"])
+        if walked and report["mode"] == "idle":
+            return Controls(False, frozenset({QUIT}))
+        pressed = {"idle": ARM, "hold": WALK}.get(report["mode"], DEAD_MAN)
+        return Controls(not first and not walked, frozenset({pressed}))
+
+    driven_by(monkeypatch, bench, controls)
+    assert joy(socket=bench.socket) == exit_codes.OK
+    assert "stopping" in seen and "joy" not in str(bench.wait_for(lambda report: True)["lease"])
 
 
 def test_a_gamepad_that_vanishes_stops_the_robot(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

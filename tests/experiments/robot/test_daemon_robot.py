@@ -7,6 +7,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,15 @@ def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_p
         assert read_log(copy).complete
     finally:
         robot.close()
+
+
+def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:
+    """It also stops if the experiment dies right after `arm`, because it takes its lease before the torque."""
+    robot = DaemonRobot(bench.socket)
+    arm(robot)
+    robot._client.close()
+    report = bench.wait_for(lambda status: bool(status["mode"] not in ("arming", "hold", "stopping")))
+    assert "lease" in report["notice"]
 
 
 def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_raised_and_without_torque(
@@ -125,3 +135,18 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
         first.close()
     bench.wait_for(lambda status: not status["faults"])  # the flippers have come down
     assert bench.run("arm").returncode == exit_codes.OK
+
+
+def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> None:
+    robot = DaemonRobot(bench.socket)
+    arm(robot)
+    assert run_in_another_terminal(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
+    operations = (partial(robot.wait, 0.3), partial(move, robot, {"left_sweep": 0.0}), partial(disarm, robot))
+    for operate in operations:
+        with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):
+            operate()
+    robot.close()
+    assert bench.run("walk").returncode == exit_codes.OK
+    with pytest.raises(BenchError, match="the robot is walking: wait for its end, or 'mudskipper stop'"):
+        DaemonRobot(bench.socket)
+    assert bench.wait_for(lambda status: status["lease"] is None)["mode"] == "walking"
