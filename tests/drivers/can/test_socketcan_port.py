@@ -20,8 +20,7 @@ from control.records import JOINTS, NEVER_S
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame, encode_frame
 from drivers.can.port_health import BusState
-from drivers.can.socket_messages import LONGEST_BYTES, RECORD, RESULT, SocketMessages
-from drivers.can.socketcan_port import SO_RXQ_OVFL, SocketcanPort
+from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from drivers.moteus import codec as moteus
@@ -35,7 +34,6 @@ ENCODER = Frame(0x009, bytes(range(8)))
 WARNING = Frame(0x004, bytes.fromhex("00 08 00 00 00 00 00 00"), is_error=True)
 OFF = Frame(0x040, bytes(8), is_error=True)
 RESTARTED = Frame(0x100, bytes(8), is_error=True)
-SO_TIMESTAMPNS = 35  # asm-generic/socket.h
 GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)
 
 
@@ -52,46 +50,17 @@ class KernelSocket(CanSocket):
         super().setsockopt(level, number, value, *more)
         self.socket_options[number] = value
 
-    def raise_problem(self) -> None:
-        if self.reported and isinstance(self.reported[0], OSError):
-            raise self.reported.pop(0)
-
     def recvmsg(self, *arguments: Any) -> Any:
-        self.raise_problem()
         arrived = super().recvmsg(*arguments)
-        return self.reported.pop(0) if self.reported else arrived
+        reported = self.reported.pop(0) if self.reported else arrived
+        if isinstance(reported, OSError):
+            raise reported
+        return reported
 
     def send(self, data: Any, *flags: Any) -> int:
         if self.send_problem is not None:
             raise self.send_problem
         return super().send(data, *flags)
-
-
-class KernelMessages(SocketMessages):
-    """The reading of such a socket by one call."""
-
-    def __init__(self, near: KernelSocket) -> None:
-        super().__init__(near)
-        self._near = near
-
-    def fill(self) -> int:
-        self._near.raise_problem()
-        count = super().fill()
-        for i in range(count):
-            if self._near.reported:
-                self.put(i, *self._near.reported.pop(0))
-        return count
-
-    def put(self, index: int, encoded: bytes, additions: list[tuple[int, int, bytes]], marks: int, _: None) -> None:
-        packed = b""
-        for level, kind, value in additions:
-            head = struct.pack("@Nii0l", socket.CMSG_LEN(len(value)), level, kind)
-            packed += (head + value).ljust(socket.CMSG_SPACE(len(value)), b"\0")
-        record = index * RECORD.size
-        self.records[record : record + len(encoded)] = encoded
-        record += LONGEST_BYTES
-        self.records[record : record + len(packed)] = packed
-        RESULT.pack_into(self.headers, index * RESULT.size, len(packed), marks, len(encoded))
 
 
 class Bench:
@@ -101,17 +70,16 @@ class Bench:
         self.kernel, near = open_pair(KernelSocket)
         assert isinstance(near, KernelSocket)
         self.socket = near
-        bus, messages = open_bus(near), KernelMessages(near)
-        self.port = SocketcanPort(bus, messages=messages) if kind is SocketcanPort else PythonCanPort(bus)
+        self.port: SocketcanPort | PythonCanPort = kind(open_bus(near))
 
     def report(self, *frames: Frame) -> None:
         for frame in frames:
             self.kernel.send(encode_frame(frame))
 
     def replace(self, *reported: Any) -> None:
-        """Let the socket raise this, or return it in place of frames that arrive."""
+        """Let frames arrive for which the socket returns or raises this."""
         self.socket.reported += reported
-        self.report(*[ENCODER for each in reported if not isinstance(each, OSError)])
+        self.report(*[ENCODER] * len(reported))
 
     def receive(self) -> list[Frame]:
         return [frame._replace(stamp_s=NEVER_S) for frame in self.port.receive()]
@@ -248,15 +216,6 @@ def test_garbage_of_another_size_is_counted_and_hides_nothing(bench: Bench, garb
     assert bench.receive() == [ENCODER]
     assert (bench.port.error_frames, bench.port.state) == (1, BusState.ACTIVE)
     assert bench.port.last_error
-
-
-def test_all_frames_that_wait_are_read_in_order_also_by_several_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("socket_messages", "socketcan_port"):
-        monkeypatch.setattr(f"drivers.can.{module}.MOST", 2)
-    bench, frames = Bench(), [Frame(i, bytes(i)) for i in range(5)]
-    bench.report(*frames)
-    assert bench.receive() == frames
-    bench.close()
 
 
 def test_can_fd_frames_are_received_and_sent(bench: Bench) -> None:
