@@ -52,9 +52,7 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     }
     figure = Figure(figsize=(7.0, 8.2))
     panels = figure.subplots(len(curves), 1, sharex=True)
-    for letter, panel, (ylabel, lines) in zip(
-        "BCDE", panels, curves.items(), strict=True
-    ):  # the paper's A is a drawing
+    for letter, panel, (ylabel, lines) in zip("BCDE", panels, curves.items(), strict=True):  # A is a drawing
         for label, values in lines.items():
             panel.plot(stride["time_s"], values, label=label, **(MODELLED if label.startswith("by") else THIN))
         panel.axhline(0.0, color=GREY, linewidth=0.6)
