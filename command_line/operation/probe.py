@@ -83,6 +83,6 @@ def probe_report(found: ProbedSurface, changes: Changes) -> dict[str, Any]:
 
 
 def show_difference(difference: str) -> bool:
-    """Return True: whoever names a file has agreed to its change."""
+    """Return True: a user who names a file has agreed to its change."""
     print(difference, file=stderr)
     return True
