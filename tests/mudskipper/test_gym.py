@@ -98,11 +98,11 @@ def test_a_robot_behind_a_socket_is_moved_only_with_an_operator(options: dict[st
         MudWalk(**options)
 
 
-def test_an_operator_arms_the_robot_of_a_socket_before_each_reset(bench: Bench) -> None:
-    with MudWalk(backend="daemon", socket=bench.socket, operated=True, duration_s=1.0) as walk:
+def test_an_operator_arms_the_robot_of_a_socket_before_each_reset(own_bench: Bench) -> None:
+    with MudWalk(backend="daemon", socket=own_bench.socket, operated=True, duration_s=1.0) as walk:
         with pytest.raises(RuntimeError, match="idle"):
             walk.reset()
-        with Client(bench.socket) as operator:
+        with Client(own_bench.socket) as operator:
             operator.arm()
             operator.wait_for("hold")
             walk.reset()
