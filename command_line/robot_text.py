@@ -173,6 +173,14 @@ def log_part(log: Report, brief: bool = False) -> Part:
     return ", ".join(text for text, said in facts.items() if said) or "ok", WARNING if log["dropped"] else ""
 
 
+def quota_text(quota_bytes: int, min_free_fraction: float) -> str:
+    """Return which logs the robot deletes, and when."""
+    limits = [f"more than {quota_bytes / 1e9:g} GB of logs"] * (quota_bytes > 0)
+    limits += [f"less than {100.0 * min_free_fraction:g} % of the disk free"] * (min_free_fraction > 0.0)
+    rule = "the oldest copied log is deleted, uncopied ones last"
+    return f"at {' or '.join(limits)} {rule}" if limits else "no log is deleted"
+
+
 def machine_lines(report: Report) -> list[tuple[str, Part]]:
     """Return the state of loop, buses, supply, pose, log and lease, each with its name."""
     loop, bus, pose = report["loop"], report["bus"], report["pose"]

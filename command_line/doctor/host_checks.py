@@ -27,10 +27,11 @@ from command_line.doctor.host_facts import (
     read_text,
     wake_limit_us,
 )
+from command_line.robot_text import quota_text
 from experiments.reports.counted_nouns import counted
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
-from firmware_host.log.log_folder import FreeSpace, free_space, quota_text, unfinished_files
+from firmware_host.log.log_folder import FreeSpace, copies_text, free_space, unfinished_files
 from logs.files.stored_logs import size_text
 
 ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less memory
@@ -175,7 +176,7 @@ def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs
     below_root = root / folder.absolute().relative_to("/")
     yield log_space(log, root)
     yield examine_folder(below_root, writer)
-    yield ok("quota", quota_text(below_root, log.quota_bytes, log.min_free_fraction))
+    yield ok("quota", f"{quota_text(log.quota_bytes, log.min_free_fraction)}; {copies_text(below_root)}")
     if not daemon_runs:
         yield examine_unfinished(below_root)
 

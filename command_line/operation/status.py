@@ -15,6 +15,7 @@ from command_line.robot_text import (
     notices,
     plain,
     position_text,
+    quota_text,
     stride_text,
     style_of,
     unheard_text,
@@ -46,15 +47,6 @@ def status_text(report: Report) -> str:
     parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
     for name, (text, style) in machine_lines(report):
         parts += [(f"\n{name:7}", ""), (text, style)]
-    if report["log"]["path"]:
-        parts.append((f"\nquota  {_quota_text(report['log'])}", ""))
+    if (log := report["log"])["path"]:
+        parts.append((f"\nquota  {quota_text(log['quota_bytes'], log['min_free_fraction'])}", ""))
     return plain(parts)
-
-
-def _quota_text(log: Report) -> str:
-    """Return which logs are deleted, and when; `doctor`, which may read their folder, also counts them."""
-    quota_gb, free_percent = log["quota_bytes"] / 1e9, 100.0 * log["min_free_fraction"]
-    limits = [f"more than {quota_gb:g} GB of logs"] * (quota_gb > 0.0)
-    limits += [f"less than {free_percent:g} % of the disk free"] * (free_percent > 0.0)
-    rule = "the oldest copied log is deleted, uncopied ones last"
-    return f"at {' or '.join(limits)} {rule}" if limits else "no log is deleted"

@@ -8,13 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.actuator.fit import JointFit
-from experiments.reports.mud_styles import GREY, INK
-from experiments.reports.style import FORWARD
+from experiments.reports.style import FAINT, FORWARD, INK
 from experiments.reports.value_text import value_text
 
-HEIGHT_IN, WIDTH_IN = 4.2, 5.0  # two next to each other are as wide as every picture
+HEIGHT_IN, WIDTH_IN, COLUMNS = 4.2, 5.0, 2  # two next to each other are as wide as every picture
 SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
-DASH: dict[str, Any] = {"color": GREY, "linewidth": 1.2}
+DASH: dict[str, Any] = {"color": FAINT, "linewidth": 1.2}
 DOT: dict[str, Any] = {"color": FORWARD, "markerfacecolor": "none", "zorder": 3}
 
 
@@ -56,10 +55,14 @@ def draw_friction(fits: Sequence[JointFit]) -> Figure:
 
 
 def _panels(fits: Sequence[JointFit], xlabel: str, ylabel: str) -> tuple[Figure, Sequence[Axes]]:
-    """Return one panel for each joint, side by side."""
-    figure = Figure(figsize=(WIDTH_IN * len(fits), HEIGHT_IN))
-    axes: Sequence[Axes] = figure.subplots(1, len(fits), sharex=True, sharey=True, squeeze=False)[0]
-    for axis, fit in zip(axes, fits, strict=True):
-        axis.set(title=fit.numbers["joint"].replace("_", " "), xlabel=xlabel)
-    axes[0].set_ylabel(ylabel)
-    return figure, axes
+    """Return one panel for each joint, two in a row."""
+    columns = min(COLUMNS, len(fits))
+    rows = -(-len(fits) // columns)
+    figure = Figure(figsize=(WIDTH_IN * columns, HEIGHT_IN * rows))
+    axes: list[Axes] = list(figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).flat)
+    for axis, fit in zip(axes, fits, strict=False):
+        axis.set(title=fit.numbers["joint"].replace("_", " "), xlabel=xlabel, ylabel=ylabel)
+        axis.label_outer()
+    for axis in axes[len(fits) :]:
+        axis.set_axis_off()
+    return figure, axes[: len(fits)]

@@ -17,7 +17,7 @@ from experiments.actuator.plan import WeighingPlan, steps_of
 from experiments.actuator.plots import draw_friction, draw_torques
 from experiments.actuator.simulation import truth_rows
 from experiments.reports.text_tables import number
-from experiments.reports.value_text import fraction_text, value_text
+from experiments.reports.value_text import fraction_text, miss_text, value_text
 from experiments.study.notebook import Entry
 from experiments.study.result import Figure, Result, Table
 
@@ -154,6 +154,7 @@ def _constant_table(fits: Sequence[JointFit]) -> Table:
             "joint": numbers["joint"],
             "k_t": value_text(numbers["torque_constant_nm_a"], numbers["torque_constant_error_nm_a"]),
             "configured": f"{numbers['configured_nm_a']:g}",
+            "k_t from it": miss_text(numbers["torque_constant_nm_a"], numbers["configured_nm_a"]),
             "RMSE": f"{numbers['rmse_configured_nm']:.4f}",
             "RMSE fitted": f"{numbers['rmse_fitted_nm']:.4f}",
             "repeatability": fraction_text(numbers["repeatability"]),

@@ -1,4 +1,7 @@
-"""Speed of a campaign's walks against each key that varies: a dot for each point, and the means of each value."""
+"""Speed of a campaign's walks against each key that varies: a dot for each point, and the means of each value.
+
+Thin lines join the points of a grid that differ in that key alone: where they are not parallel, keys act together.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -36,13 +39,16 @@ def draw_speeds(points: Sequence[Mapping[str, Any]]) -> Figure:
 def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> None:
     values = [point["values"][key] for point in points]
     is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-    x = values if is_number else list(map(_text, values))  # names have an axis of their own
+    x = values if is_number else list(map(name_text, values))  # names have an axis of their own
     speeds, sds = ([100.0 * point[name] for point in points] for name in ("speed_m_s", "speed_sd_m_s"))
     drawn = DataFrame({"x": x, "cm/s": speeds, "sd": sds})
     look: dict[str, Any] = {"linestyle": "", "marker": ".", "color": FAINT, "elinewidth": 0.6, "alpha": 0.7}
     panel.errorbar(drawn["x"], drawn["cm/s"], drawn["sd"].fillna(0.0), **look)
     means = drawn.groupby("x", sort=is_number)["cm/s"].mean()
     if len(means) <= FEW:
+        others = [str({name: other for name, other in point["values"].items() if name != key}) for point in points]
+        for _, alike in drawn.groupby(others, sort=False):
+            panel.plot(alike["x"], alike["cm/s"], color=FAINT, linewidth=0.6, alpha=0.7)
         panel.plot(means.index, means, "o-" if is_number else "o", color=FORWARD)
     if not is_number:
         panel.set_xlim(-0.5, len(means) - 0.5)
@@ -52,5 +58,6 @@ def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> Non
     panel.set_xlabel(key, fontsize="small")
 
 
-def _text(value: Any) -> str:
+def name_text(value: Any) -> str:
+    """Return a word, or the name of a file without its folder."""
     return str(value).rpartition("/")[2] or "-"

@@ -97,16 +97,17 @@ def _range(key: str, given: Mapping[str, Any]) -> Range:
 
 def _flatten(table: Tables, section: str) -> Values:
     """Return the values of nested tables by dotted key. Raises ConfigurationError where there is none."""
-    values = dict(_leaves(table, ""))
+    values = dict(leaves(table))
     if not values:
         raise ConfigurationError([f"{section}: must have at least one key, such as world.segment.strength_pa"])
     return values
 
 
-def _leaves(table: Mapping[str, Any], path: str) -> Iterator[tuple[str, Any]]:
+def leaves(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested tables with their dotted keys."""
     for name, value in table.items():
         if isinstance(value, dict) and not value.keys() & _RANGE_KEYS:
-            yield from _leaves(value, f"{path}{name}.")
+            yield from leaves(value, f"{path}{name}.")
         else:
             yield f"{path}{name}", value
 

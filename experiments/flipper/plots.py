@@ -12,7 +12,6 @@ from control.records import COEFFICIENTS, Phase
 from experiments.flipper.modelled_force import modelled_stride
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
-    GREY,
     LABELS,
     PHASE_NAMES,
     PHASE_SHADES,
@@ -21,6 +20,7 @@ from experiments.reports.mud_styles import (
     looks_of,
     name_muds,
 )
+from experiments.reports.style import FAINT
 from experiments.reports.value_text import N_CM3
 from experiments.study.notebook import Entry
 from experiments.trials.stride_profile import profile_from, stroke_of
@@ -55,12 +55,12 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     for letter, panel, (ylabel, lines) in zip("BCDE", panels, curves.items(), strict=True):  # A is a drawing
         for label, values in lines.items():
             panel.plot(stride["time_s"], values, label=label, **(MODELLED if label.startswith("by") else THIN))
-        panel.axhline(0.0, color=GREY, linewidth=0.6)
+        panel.axhline(0.0, color=FAINT, linewidth=0.6)
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
         panel.set_ylabel(ylabel)
         panel.margins(x=0.0)
     surface_cm = 100.0 * (trial["strides"][method][0]["surface_m"] or 0.0)
-    panels[0].axhline(surface_cm, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
+    panels[0].axhline(surface_cm, color=FAINT, linewidth=0.8, linestyle=":", label="surface found")
     panels[0].invert_yaxis()
     for phase, name in PHASE_NAMES.items():
         times_s = by_phase[phase]["time_s"].dropna()
@@ -82,7 +82,7 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
 def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry]) -> Figure:
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
     rows = 3 if any(mud["truth"] for mud in muds) else 2
-    figure = Figure(figsize=(11.0, 3.3 * rows + 0.5))
+    figure = Figure(figsize=(10.0, 3.0 * rows + 0.5))
     panels = figure.subplots(rows, 3)
     looks = looks_of([mud["mud"] for mud in muds])
     _draw_curves(panels[0], firsts, looks)
@@ -112,7 +112,7 @@ def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
                 panel.set(xlabel="sweep $\\alpha$ (°)", ylabel=f"$f_x$ in {name} (N)")
             panel.plot(x, y, label=mud_text(mud), **line_of(looks[mud]))
     for panel in panels:
-        panel.axhline(0.0, color=GREY, linewidth=0.6)
+        panel.axhline(0.0, color=FAINT, linewidth=0.6)
     for panel in panels[1:]:
         panel.invert_xaxis()  # in the direction of the motion
 
@@ -122,7 +122,7 @@ def _draw_compared(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[
     for mud in muds:
         if truth := (mud["truth"] or {}).get(name):
             draw_coefficient(panel, truth / N_CM3, mud[name], looks[mud["mud"]])
-    panel.axline((0.0, 0.0), slope=1.0, color=GREY, linewidth=1.0, label="equal")
+    panel.axline((0.0, 0.0), slope=1.0, color=FAINT, linewidth=1.0, label="equal")
     panel.set(xlabel=f"{LABELS[name]} by load cell (N/cm³)", ylabel="by the flipper (N/cm³)")
     panel.set(xlim=(0.0, None), ylim=(0.0, None))
     panel.legend(fontsize="small", loc="upper left")

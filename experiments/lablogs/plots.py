@@ -15,10 +15,11 @@ from experiments.lablogs.comparisons import disturbed_values, flipper_pairs
 from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING, MISSING_ROWS, RECORDED, strokes_of
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
-from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS, name_decades
+from experiments.reports.mud_styles import LABELS, MARKS, name_decades
+from experiments.reports.style import FAINT, INK
 from experiments.reports.value_text import N_CM3
 
-COLOURS = dict(zip(COEFFICIENTS, ("tab:blue", "tab:red", "tab:green"), strict=True))
+COLOURS = dict(zip(COEFFICIENTS, ("C0", "C1", "C2"), strict=True))
 WIDEST = 5.0  # standard deviations in the histogram; larger ones are drawn at its edge
 DODGE = 0.08  # between the trials of one stroke
 SMALL: dict[str, Any] = {"fontsize": "small"}
@@ -69,7 +70,7 @@ def _draw_deviations(panel: Axes, groups: Mapping[str, DataFrame], coefficient: 
         _standardized([scatter_between_strokes(each) for each in strokes]),
     ]
     edges, x = np.linspace(-WIDEST, WIDEST, 21).tolist(), np.linspace(-WIDEST, WIDEST, 201)
-    panel.hist(deviations, edges, stacked=True, color=(GREY, "tab:blue"), label=("between trials", "between strokes"))
+    panel.hist(deviations, edges, stacked=True, color=(FAINT, "C0"), label=("between trials", "between strokes"))
     expected = sum(map(len, deviations)) * (edges[1] - edges[0])
     panel.plot(x, expected * np.exp(-x * x / 2.0) / np.sqrt(2.0 * pi), color=INK, label="normal")
 
@@ -100,7 +101,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
     colour = COLOURS[coefficient]
     panel.errorbar(left, right, right_error, left_error, fmt="o", color=colour, markersize=4, linewidth=1)
     ends = [0.8 * min(left.min(), right.min()), 1.25 * max(left.max(), right.max())]
-    panel.plot(ends, ends, color=GREY, linewidth=1)
+    panel.plot(ends, ends, color=FAINT, linewidth=1)
     panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     for axis in (panel.xaxis, panel.yaxis):
         name_decades(axis)
@@ -123,7 +124,7 @@ def _draw_ratios(panel: Axes, changes: DataFrame, disturbance: str) -> None:
         ratios = drawn.loc[drawn["coefficient"] == name, "ratio"].sort_values()
         x = number + np.linspace(-0.3, 0.3, len(ratios))
         panel.plot(x, ratios, ".", color=COLOURS[name], markersize=4)
-    panel.axhline(1.0, color=GREY, linewidth=1)
+    panel.axhline(1.0, color=FAINT, linewidth=1)
     panel.set_yscale("log")
     panel.set_xticks(range(len(COEFFICIENTS)), [LABELS[name] for name in COEFFICIENTS], **SMALL)
 

@@ -12,8 +12,9 @@ from experiments.loadcell.analysis import MudCoefficient
 from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, name_muds
+from experiments.reports.style import FAINT, INK
 
-MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
+MODEL: dict[str, Any] = {"color": INK, "linestyle": (0, (5, 2)), "linewidth": 1.4, "zorder": 5}
 BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
 
@@ -22,7 +23,7 @@ def draw_mud(
     trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings
 ) -> Figure:
     """Draw all trials of one mud from their beginnings, with the model by the mud's coefficients."""
-    figure = Figure(figsize=(12.0, 7.2))
+    figure = Figure(figsize=(10.0, 7.0))
     (vertical, shear), (depth, curve) = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     strokes = [trial for trial in trials if "k_p" in trial.strokes]
     for i, trial in enumerate(strokes):
@@ -79,23 +80,23 @@ def _plot_vertical_model(
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
     for panel, title, x, y in (
-        (vertical, "insertion, hold, extraction", "", "force on the plate (N), up positive"),
+        (vertical, "insertion, hold, extraction", "", "force on the plate, up (N)"),
         (shear, "horizontal shear", "time since the force began (s)", "force against the drag (N)"),
         (depth, "depth", "time since the surface (s)", "depth (cm)"),
         (curve, "force over depth", "depth (cm)", "force (N)"),
     ):
         panel.set(xlabel=x, ylabel=y, title=title)
         if panel is not depth:
-            panel.axhline(0.0, color="grey", linewidth=0.6)
+            panel.axhline(0.0, color=FAINT, linewidth=0.6)
     depth.invert_yaxis()
     depth.sharex(vertical)
     for panel in (vertical, shear):
         if panel.get_legend_handles_labels()[0]:
-            panel.legend(loc="upper right" if panel is vertical else "lower center", ncols=2)
+            panel.legend(loc="upper right" if panel is vertical else "lower center", ncols=2, frameon=False)
 
 
 def draw_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> Figure:
-    figure, looks = Figure(figsize=(11.0, 3.6)), looks_of(list(muds))
+    figure, looks = Figure(figsize=(10.0, 3.4)), looks_of(list(muds))
     for panel, name in zip(figure.subplots(1, 3), COEFFICIENTS, strict=True):
         for x, (mud, own) in enumerate(muds.items()):
             draw_coefficient(panel, x, own[name], looks[mud])

@@ -47,9 +47,9 @@ MEASURED = (
     "An encoder measured the stage's position: depths count from the surface that the force shows, and samples at rest "
     "do not count. The coefficients are those at the set speed."
 )
-FITTED = "measured (solid, one colour a trial) and modelled with the mud's coefficients (red, dashed)."
-HEADING = "Coefficients ± one standard error of the trials ± one of the bench; see the report for their parts"
-COMPARED = "Flipper and load cell; see the report for the effects of plate and path alone"
+FITTED = "measured (solid, one colour a trial) and modelled with the mud's coefficients (dashed)."
+HEADING = "Coefficients ± one standard error of the trials ± one of the bench"
+COMPARED = "Flipper and load cell"
 TRUTH = "The same plate in even motion, without stage, cell and noise"
 TRIAL_KEYS = ("speed_m_s", "is_measured", "alignment", "problem", "remark")
 UNITS = dict.fromkeys(COEFFICIENTS, "N/cm³") | {"flipper": "N/cm³", "load cell": "N/cm³", "speed": "m/s"}
@@ -114,6 +114,7 @@ def make_result(
     for mud, coefficients in muds.items():
         own, section = [trial for trial in results.trials if trial.recorded.mud == mud], f"Mud {mud_text(mud)}"
         rows = DataFrame([_trial_row(trial) for trial in own])
+        rows = rows.loc[:, ~rows.isin(["", "-"]).all()]
         tables.append(Table(f"trials {mud}", "", UNITS, rows, section, on_page_only=True))
         name, draw = re.sub(r"[^\w.]+", "_", f"mud_{mud}"), partial(draw_mud, own, coefficients, plan.settings)
         figures.append(Figure(name, f"{section}: {FITTED}", draw, section))

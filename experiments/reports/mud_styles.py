@@ -11,9 +11,9 @@ from matplotlib.ticker import LogLocator
 
 from control.records import Phase
 from experiments.reports.mud_names import mud_text
+from experiments.reports.style import FAINT, INK
 from experiments.reports.value_text import N_CM3
 
-INK, GREY = "#222222", "#8a8a8a"
 PHASE_SHADES = {Phase.INSERTION: "#d6e6f4", Phase.STANCE: "#dcefd9", Phase.EXTRACTION: "#fbe3cc"}  # as in the paper
 PHASE_NAMES = {Phase.INSERTION: "insertion", Phase.STANCE: "stance", Phase.EXTRACTION: "extraction"}
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)))
@@ -49,7 +49,7 @@ def draw_coefficient(panel: Axes, x: float, found: Any, look: dict[str, Any]) ->
         return
     value, at_least = found.value / N_CM3, getattr(found, "at_least", False)
     error = ARROW_FRACTION * value if at_least else 2.0 * (found.std_error or 0.0) / N_CM3
-    panel.plot([x] * len(found.trials), np.array(found.trials) / N_CM3, "_", color=GREY, markersize=12)
+    panel.plot([x] * len(found.trials), np.array(found.trials) / N_CM3, "_", color=FAINT, markersize=12)
     panel.errorbar(x, value, error or None, lolims=at_least, capsize=4, ecolor=INK, linestyle="", **mark_of(look))
 
 

@@ -11,12 +11,12 @@ from typing import Annotated, Any
 from pandas import DataFrame
 
 from experiments.campaign.campaign_file import Campaign, Plates, load_campaign
-from experiments.campaign.plots import draw_speeds
-from experiments.campaign.points import Tables, Values, with_values
+from experiments.campaign.plots import draw_speeds, name_text
+from experiments.campaign.points import Tables, Values, leaves, with_values
 from experiments.campaign.trials_table import write_trials
 from experiments.campaign.walk_trial import BROKEN, run_walk
 from experiments.reports.counted_nouns import counted
-from experiments.reports.text_tables import number
+from experiments.reports.text_tables import number, value_shown
 from experiments.study.option import Option
 from experiments.study.provenance import program_text, provenance
 from experiments.study.result import Figure, Result, Table
@@ -25,7 +25,10 @@ from firmware_host.software_version import build_metadata
 from logs.catalogue.entry import TRIALS
 
 SHOWN_POINTS = 30
-SPEEDS = "A dot is a point with its standard deviation over the seeds, a large dot the mean over all points of a value."
+SPEEDS = (
+    "A dot is a point with its standard deviation over the seeds, a large dot the mean over all points of a value. "
+    "Thin lines join points that differ in this key alone."
+)
 
 
 def folder_name(file: Path) -> str:
@@ -61,7 +64,8 @@ def study(trials: Trials, file: Annotated[Path, Option("in TOML, such as example
         "simulated": True,
     }
     figure = Figure("speeds", SPEEDS, partial(draw_speeds, points), "Speed against each key")
-    return Result([_table(points, len(rows))], [figure], summary, f"Campaign {campaign.name}")
+    texts = {"Points": _explanation(campaign, points)}
+    return Result([_table(points, len(rows))], [figure], summary, f"Campaign {campaign.name}", texts)
 
 
 def walk_point(point: int, seed: int, values: Values, base: Tables, plates: Plates) -> dict[str, Any]:
@@ -97,6 +101,17 @@ def _point_result(values: Values, walked: DataFrame) -> dict[str, Any]:
     }
 
 
+def _explanation(campaign: Campaign, points: list[dict[str, Any]]) -> str:
+    """Return the fastest point, then what all walks have in common."""
+    fastest = max(points, key=lambda point: max(0.0, point["speed_m_s"]))  # NaN is no speed
+    at = ", ".join(f"{key} = {name_text(value)}" for key, value in fastest["values"].items())
+    common = ", ".join(f"{key} = {value_shown(value)}" for key, value in leaves(campaign.base))
+    return (
+        f"The fastest point has {number(100.0 * fastest['speed_m_s'], 2)} cm/s: {at}. Speeds are means over seeds 1 to "
+        f"{campaign.seeds}.\n\nAll walks have {common or 'the defaults'}."
+    )
+
+
 def _table(points: list[dict[str, Any]], walks: int) -> Table:
     shown, which = points, ""
     if len(points) > SHOWN_POINTS:
@@ -107,10 +122,10 @@ def _table(points: list[dict[str, Any]], walks: int) -> Table:
         not_started = [f"{point['not_started']} not started"] * bool(point["not_started"])
         speeds = {"speed": point["speed_m_s"], "sd": point["speed_sd_m_s"]}
         rows.append(
-            point["values"]
+            {key: name_text(value) if isinstance(value, str) else value for key, value in point["values"].items()}
             | {name: number(100.0 * speed_m_s, 2) for name, speed_m_s in speeds.items()}
             | {"strides": point["strides"], "stuck": point["stuck_strides"]}
             | {"faults": ", ".join([*point["faults"], *not_started])}
         )
     title = f"{counted(walks, 'walk')} at {counted(len(points), 'point')}{which}; all are in {TRIALS}"
-    return Table("points", title, {"speed": "cm/s"}, DataFrame(rows), "Points")
+    return Table("points", title, {"speed": "cm/s", "sd": "cm/s"}, DataFrame(rows), "Points")

@@ -65,7 +65,7 @@ FIELD_OF_LAYER = {
     "saturation": "current_limit_a",
 }
 LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
-COLOURS = {DEFAULT: "tab:blue", PAPER: "tab:red", COMPENSATED: "tab:orange"}
+COLOURS = {DEFAULT: "C0", PAPER: "C1", COMPENSATED: "C3"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
 

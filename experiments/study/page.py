@@ -7,6 +7,7 @@ picture is also there in SVG, PDF and PNG, and all have one style.
 import base64
 import gc
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
@@ -32,7 +33,8 @@ table { border-collapse: collapse; font-size: 0.8em; font-variant-numeric: tabul
 table { border-bottom: 1.5px solid #111 } tr + tr td { border-top: 1px solid #ddd }
 caption { text-align: left; font-weight: bold; padding-bottom: 0.3em }
 th { text-align: left; border-top: 1.5px solid #111; border-bottom: 1px solid #111 }
-th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap } td.long { white-space: normal }
+th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap } th, td.long { white-space: normal }
+th { vertical-align: bottom } .number { text-align: right }
 thead { display: table-header-group } tr { break-inside: avoid }
 figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
@@ -41,6 +43,7 @@ figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top:
   .table { overflow: visible } th, td { padding-right: 0.8em } img { max-height: 240mm } }
 """
 LONG = 32  # letters of a cell from which it may be broken into lines
+NUMBER = re.compile(r"[+-]?\d+(\.\d+)?( %)?|-")
 Watch = Callable[[str, int, int], None]
 
 
@@ -121,13 +124,14 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
     yield f"<style>\n{PAGE_STYLE}</style></head><body>\n<h1>{title}</h1>"
     yield f'<p class="when">{made}, mudskipper {version}</p>'
     parts: list[Table | Figure] = [*result.tables, *result.figures]
-    explained = [section for section, text in result.texts.items() if text]
-    for section in dict.fromkeys([*explained, *(part.section for part in parts)]):
-        yield f"<h2>{escape(section)}</h2>"
-        yield from (f"<p>{escape(text)}</p>" for text in result.texts.get(section, "").split("\n\n") if text)
-        for part in parts:
-            if part.section == section:
-                yield _table(part) if isinstance(part, Table) else _figure(part, folder)
+    for section in dict.fromkeys([*result.texts, *(part.section for part in parts)]):
+        own = [part for part in parts if part.section == section]
+        paragraphs = [f"<p>{escape(text)}</p>" for text in result.texts.get(section, "").split("\n\n") if text]
+        yield from [f"<h2>{escape(section)}</h2>"] * bool(own or paragraphs)
+        yield from paragraphs[:1]  # the others explain what is shown
+        yield from (_table(part) if isinstance(part, Table) else _figure(part, folder) for part in own)
+        yield from paragraphs[1:]
+    yield from ["<h2>Remarks</h2>"] * bool(result.notes)
     yield from (f"<p>{escape(note)}</p>" for note in result.notes)
     logs = f"Logs: {', '.join(escape(log.name) for log in result.logs)}." if result.logs else ""
     yield f"<footer>Numbers: {result.files.summary}. {logs}</footer>\n</body></html>"
@@ -136,13 +140,18 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
 def _table(table: Table) -> str:
     cells: Rows = table.cells()
     caption = f"<caption>{escape(table.title)}</caption>\n" if table.title else ""
-    lines = "\n".join(_row(row, "td") for row in cells[1:])
-    return f'<div class="table"><table>\n{caption}<thead>{_row(cells[0], "th")}</thead>\n{lines}\n</table></div>'
+    is_number = [all(map(NUMBER.fullmatch, column[1:])) for column in zip(*cells, strict=True)]
+    head, *lines = (_row(row, "td" if number else "th", is_number) for number, row in enumerate(cells))
+    body = "\n".join(lines)
+    return f'<div class="table"><table>\n{caption}<thead>{head}</thead>\n{body}\n</table></div>'
 
 
-def _row(cells: Sequence[str], tag: str) -> str:
-    long = [' class="long"' if tag == "td" and len(cell) > LONG else "" for cell in cells]
-    texts = [f"<{tag}{kind}>{escape(cell)}</{tag}>" for cell, kind in zip(cells, long, strict=True)]
+def _row(cells: Sequence[str], tag: str, is_number: Sequence[bool]) -> str:
+    kinds = [
+        ' class="number"' if number else ' class="long"' if len(cell) > LONG else ""
+        for cell, number in zip(cells, is_number, strict=True)
+    ]
+    texts = [f"<{tag}{kind}>{escape(cell)}</{tag}>" for cell, kind in zip(cells, kinds, strict=True)]
     return f"<tr>{''.join(texts)}</tr>"
 
 

@@ -13,7 +13,8 @@ from control.records import COEFFICIENTS, Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import GREY, INK, LABELS, PHASE_NAMES, line_of, looks_of
+from experiments.reports.mud_styles import LABELS, PHASE_NAMES, line_of, looks_of
+from experiments.reports.style import FAINT, INK
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3
 from experiments.study.notebook import Entry
@@ -23,20 +24,20 @@ from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import WalkTrials
 
 STROKE_STYLES = {  # as in the paper
-    Phase.INSERTION: ("tab:blue", "-"),
-    Phase.STANCE: ("tab:green", "--"),
-    Phase.EXTRACTION: ("tab:orange", "-."),
+    Phase.INSERTION: ("C0", "-"),
+    Phase.STANCE: ("C2", "--"),
+    Phase.EXTRACTION: ("C3", "-."),
 }
 METHOD_STYLES: dict[str, dict[str, Any]] = {
-    DEFAULT: {"color": "tab:blue", "marker": "o"},
-    PAPER: {"color": "tab:red", "marker": "x"},
-    COMPENSATED: {"color": "tab:orange", "marker": "+"},
+    DEFAULT: {"color": "C0", "marker": "o"},
+    PAPER: {"color": "C1", "marker": "x"},
+    COMPENSATED: {"color": "C3", "marker": "+"},
 }
 LOAD_CELL = "load cell"
 BARS = {
     KNOWN: ("paper's law", None),  # in the colour of its depth
-    KNOWN_COMPENSATED: ("paper's law\nwith drag", "tab:green"),
-    DEFAULT: ("default", "tab:purple"),
+    KNOWN_COMPENSATED: ("paper's law\nwith drag", "C2"),
+    DEFAULT: ("default", "C4"),
     LOAD_CELL: ("load cell", "#d9d9d9"),
 }
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "fontsize": "small", "frameon": False}
@@ -48,12 +49,12 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: f
     profile, own = profile_from(walk), strides[strides["trial"] == walk["trial"]]
     begun_s, end_s = profile["time_s"].min(), profile["time_s"].max()
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
-    figure = Figure(figsize=(9.0, 11.0))
+    figure = Figure(figsize=(10.0, 11.0))
     panels = figure.subplots(6, 1, sharex=True)
     time_s = profile["time_s"] - begun_s
     panels[0].set_ylabel("body (cm)")
     if walk["start_m"] is None:
-        panels[0].text(0.5, 0.5, "no pose", transform=panels[0].transAxes, ha="center", color=GREY)
+        panels[0].text(0.5, 0.5, "no pose", transform=panels[0].transAxes, ha="center", color=FAINT)
     else:
         panels[0].plot(time_s, 100.0 * (profile["body_x_m"] - walk["start_m"]), color=INK, linewidth=1.2)
     upward_n = profile["force_z_n"].mask(profile["phase"] == Phase.STANCE)
@@ -98,7 +99,7 @@ def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) ->
     tallest = own["truth"].max() if own["truth"].any() else valid["value"].max() if len(valid) else 1.0
     top = HEADROOM * tallest / N_CM3
     known = own[own["truth"].notna() & (own["method"] == DEFAULT)]
-    look: dict[str, Any] = {"color": GREY, "linewidth": 1.8, "label": "load cell"}
+    look: dict[str, Any] = {"color": FAINT, "linewidth": 1.8, "label": "load cell"}
     panel.plot(known["t_end_s"] - begun_s, known["truth"] / N_CM3, "--", **look)
     for method, style in METHOD_STYLES.items():
         rows = valid[valid["method"] == method]
@@ -118,14 +119,14 @@ def _draw_coefficient(panel: Axes, name: str, own: DataFrame, begun_s: float) ->
 
 def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -> Figure:
     """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
-    figure = Figure(figsize=(11.0, 4.2))
+    figure = Figure(figsize=(10.0, 4.2))
     forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
     looks = looks_of([f"{depth_cm:g} cm" for depth_cm in walks])
     for depth_cm, trials in walks.items():
         stance, label = stroke_of(profile_from(trials[0]), Phase.STANCE), f"{depth_cm:g} cm"
         time_s = stance["time_s"] - stance["time_s"].min()
         forces.plot(time_s, stance["force_x_n"], label=f"z = {label}", **line_of(looks[label]))
-    forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
+    forces.axhline(PAPER_DRAG_N / 2.0, color=FAINT, linewidth=1.2, linestyle=":",
                    label=f"half of the paper's {PAPER_DRAG_N:g} N of body drag")  # fmt: skip
     forces.set(xlabel="time in stance (s)", ylabel="$f_x$ of one flipper (N)", ylim=(0.0, None))
     forces.legend(fontsize="small", loc="lower right")

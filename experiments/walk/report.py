@@ -99,7 +99,7 @@ def result_of(plan: WalkTrials, measured: MeasuredTrials, truth: TruthOfMud | No
     sections = [_soft_section(soft) for soft in report["soft"] if soft["depths"]]
     texts = {
         TRACK: _explanation(report, configuration),
-        **dict.fromkeys(sections[:1], drag),  # the first one explains what all have in common
+        **dict.fromkeys(sections, "") | dict.fromkeys(sections[:1], drag),  # the first one explains all of them
         COMPARISON: METHODS if report["errors"] else "",
     }
     return Result(

@@ -121,16 +121,10 @@ def mark_of(log: Path, folder: Path) -> Path:
     return folder / COPIED / log.stem
 
 
-def quota_text(folder: Path, quota_bytes: int, min_free_fraction: float) -> str:
-    """Return what the quota deletes, when, and how many logs were not copied yet."""
+def copies_text(folder: Path) -> str:
+    """Return how many logs of a folder were not copied yet."""
     logs = log_files(folder, TOP, DONE)
-    left = sum(not mark_of(path, folder).exists() for path in logs)
-    limits = [f"more than {quota_bytes / 1e9:g} GB of logs"] * (quota_bytes > 0)
-    limits += [f"less than {100.0 * min_free_fraction:g} % of the disk free"] * (min_free_fraction > 0.0)
-    if not limits:
-        return f"no log is deleted; {left} of {len(logs)} not copied"
-    rule = "the oldest copied log is deleted, uncopied ones last"
-    return f"at {' or '.join(limits)} {rule}; {left} of {len(logs)} not copied"
+    return f"{sum(not mark_of(path, folder).exists() for path in logs)} of {len(logs)} not copied"
 
 
 def delete_log(path: Path) -> str:

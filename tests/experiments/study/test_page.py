@@ -35,7 +35,7 @@ def test_the_page_contains_its_pictures_and_shows_text_as_it_is(tmp_path: Path) 
     assert [path.name for path in written] == names and shown == [(0, 1)]
     page = written[0].read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page) and page.count("data:image/png") == 1
-    for text in ("A &lt; B", "48.5 &lt;b&gt;", "Force &amp; such", "k_p (N/cm³)", "<td>-</td>", "Left out: 1."):
+    for text in ("A &lt; B", "48.5 &lt;b&gt;", "Force &amp; such", "k_p (N/cm³)", ">-</td>", "Left out: 1."):
         assert text in page
     assert RESULT.text().splitlines()[0] == "A < B" and RESULT.json() == {"muds": [{"mud": "48.5 <b>", "k_p": None}]}
 

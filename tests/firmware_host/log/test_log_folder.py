@@ -14,6 +14,7 @@ from firmware_host.log.log_folder import (
     LAST_BYTES,
     PRESERVED,
     TOP,
+    copies_text,
     copy_owner,
     delete_by_quota,
     first_path,
@@ -22,7 +23,6 @@ from firmware_host.log.log_folder import (
     make_folder,
     mark_of,
     new_run_id,
-    quota_text,
     segment_path,
     stored_files,
     unfinished_files,
@@ -138,6 +138,6 @@ def test_logs_that_were_not_copied_are_deleted_last(tmp_path: Path) -> None:
     for name in "23":
         mark_of(tmp_path / DONE / f"{name}.mcap", tmp_path).parent.mkdir(exist_ok=True)
         mark_of(tmp_path / DONE / f"{name}.mcap", tmp_path).touch()
-    assert "2 of 4 not copied" in quota_text(tmp_path, 150, 0.0)
+    assert copies_text(tmp_path) == "2 of 4 not copied"
     assert [text.split()[3] for text in delete_by_quota(tmp_path, 150, 0.0)] == ["2.mcap", "3.mcap", "1.mcap"]
     assert not list((tmp_path / "copied").iterdir())
