@@ -90,5 +90,5 @@ def _help(declared: DeclaredOption) -> str:
         return text.replace("%", "%%")
     values = default if declared.repeatable else [default]
     texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
-    shown = ", ".join(texts) if len(texts) <= SHOWN_DEFAULTS else f"{len(texts)} values"
-    return f"{text} (default: {shown}{unit})".replace("%", "%%")
+    shown = f"{', '.join(texts)}{unit}" if len(texts) <= SHOWN_DEFAULTS else f"{len(texts)} values"
+    return f"{text} (default: {shown})".replace("%", "%%")

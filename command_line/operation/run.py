@@ -54,11 +54,10 @@ def load_law(target: str) -> Callable[[list[Report]], Any]:
     """Return the function of FILE:FUNCTION. Raises CommandError where there is none."""
     file, colon, name = target.rpartition(":")
     path, name = Path(file if colon else target), name if colon else "law"
-    if not path.is_file():
-        raise usage_error(f"{path}: there is no such file")
+    path.stat()  # raises OSError where it is missing
     try:
         found = runpy.run_path(str(path)).get(name)
-    except Exception as problem:  # noqa: BLE001 - any error of a user's file
+    except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's file
         raise usage_error(f"{path}: {type(problem).__name__}: {problem}") from problem
     if not callable(found):
         raise usage_error(f"{path}: it has no function {name!r}")
@@ -69,7 +68,7 @@ def order_of(law: Callable[[list[Report]], Any], closed: list[Report]) -> Report
     """Call the law, and return its order for the strides to come. Raises LawError."""
     try:
         answer = law(closed)
-    except Exception as problem:  # noqa: BLE001 - any error of a user's law
+    except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's law
         line = extract_tb(problem.__traceback__)[-1].lineno
         raise LawError(f"the law raised {type(problem).__name__} in line {line}: {problem}") from problem
     if isinstance(answer, float):

@@ -4,9 +4,11 @@ On the way to the daemon a gait is the same tables as JSON, on one line and with
 """
 
 import json
+from errno import ENOENT
 from pathlib import Path
 from typing import Any
 
+from control.computing.suggestion import suggestion
 from control.gait.stride_table import crutching_parameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath
@@ -19,9 +21,12 @@ _READER = RecordReader(GaitPath)
 
 
 def gait_document(gait: str) -> dict[str, Any]:
-    """Return the tables of a gait: a file, or the name of one that ships. Raises ConfigurationError."""
-    shipped = SHIPPED / f"{gait}.toml"
-    path = shipped if gait.isidentifier() and shipped.exists() else Path(gait)
+    """Return the tables of a gait: a file, or the name of one that ships. Raises ConfigurationError, OSError."""
+    shipped = {path.stem: path for path in SHIPPED.glob("*.toml")}
+    path = shipped.get(gait, Path(gait))
+    if not path.exists():
+        message = f"there is no such file or shipped gait; {suggestion(gait, sorted(shipped))}"
+        raise FileNotFoundError(ENOENT, message, gait)
     return {"name": path.name} | parse_document(read_text(path), path)
 
 

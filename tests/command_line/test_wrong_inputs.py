@@ -142,11 +142,14 @@ MISSING_INPUTS = [
     "check --config /none/x.toml",
     "upgrade --check /none/x.deb",
     "joy --device /none/event7",
+    "run /none/law.py",
+    "gait check /none/gait.toml",
 ]
 UNREADABLE = [  # and what the message names
     ("log info text.mcap", "text.mcap"),
     ("log report text.mcap", "text.mcap"),
     ("plot .", "."),
+    ("gait check wlking", "did you mean walking?"),
     ("log open text.mcap --with rerun", "text.mcap"),
     ("log recover text.mcap", "text.mcap"),
     ("log query nonsense .", "nonsense"),

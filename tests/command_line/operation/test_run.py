@@ -80,6 +80,7 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
     ("body", "named"),
     [
         ("return 1 / 0", ("ZeroDivisionError", "line 3")),
+        ("raise SystemExit(0)", ("SystemExit", "line 3")),
         ("return 'deep'", ("'deep'",)),
         ("return {'depth_m': 0.03, 'method': 'disarm'}", ("'method'",)),
     ],
@@ -100,11 +101,13 @@ def test_an_order_that_the_daemon_refuses_stops_the_robot(
     assert daemon._refusal in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("content", ["", "import nothing_of_this_name", "law = 3", "def other(strides): pass"])
+@pytest.mark.parametrize(
+    "content", ["", "import nothing_of_this_name", "raise SystemExit(5)", "law = 3", "def other(strides): pass"]
+)
 def test_a_file_without_a_law_is_refused_before_the_robot_walks(tmp_path: Path, content: str) -> None:
     path = tmp_path / "law.py"
     path.write_text(content, encoding="utf-8")
-    for target in (str(path), f"{path}:absent", str(tmp_path / "absent.py")):
+    for target in (str(path), f"{path}:absent"):
         with pytest.raises(CommandError) as refused:
             run.run(target, socket=tmp_path)
         assert refused.value.status == exit_codes.USAGE

@@ -40,6 +40,16 @@ def test_the_page_contains_its_pictures_and_shows_text_as_it_is(tmp_path: Path) 
     assert RESULT.text().splitlines()[0] == "A < B" and RESULT.json() == {"muds": [{"mud": "48.5 <b>", "k_p": None}]}
 
 
+def test_a_section_shows_its_tables_below_its_first_paragraph_and_sections_keep_their_order(tmp_path: Path) -> None:
+    tables = [Table(name, name, {}, DataFrame({"n": [1]}), section) for name, section in (("t1", "A"), ("t2", "C"))]
+    texts = {"A": "found\n\nexplained", "C": "", "absent": "", "B": "method"}
+    written = write_result(tmp_path, Result(tables, texts=texts, notes=["noted"]), {})
+    page = written[0].read_text(encoding="utf-8").partition("</head>")[2]
+    parts = (">A<", "found", ">t1<", "explained", ">C<", ">t2<", ">B<", "method", "noted")
+    places = [page.index(text) for text in parts]
+    assert places == sorted(places) and "absent" not in page
+
+
 @pytest.mark.parametrize("whole_files", range(2))
 def test_a_disk_that_fills_up_leaves_the_page_that_was_there_and_nothing_cut(
     whole_files: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
