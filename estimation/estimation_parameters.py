@@ -21,6 +21,9 @@ class EstimationParameters:
 
     method: Annotated[Method, Meaning("default regresses in torque space; paper is the published method")] = "default"
     fixed_base: Annotated[bool, Meaning("the flippers hang from a bench: all their travel shears mud")] = False
+    free_body: Annotated[
+        bool, Meaning("no rail or bench holds the body down: its flippers may lift it (adaptation.body_mass_kg)")
+    ] = False
     surface_error_m: Annotated[
         float, Bounds(0.0001, 0.05), Meaning("std_error of the mud's nominal height at one stride")
     ] = 0.001

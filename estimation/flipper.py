@@ -14,7 +14,7 @@ that ends before the units finishes them at once.
 
 from collections.abc import Sequence
 from functools import partial
-from math import copysign, cos, hypot, isfinite, sin
+from math import copysign, cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work, WorkQueue, finished
@@ -26,6 +26,7 @@ from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.air import AirSwing
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
+from estimation.strokes.lift import SHEAR_OVER_STROKE, less_deep, lift_uncertainty
 from estimation.strokes.origin_fit import median
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.shear import Base, Shear, find_shear, shear_samples, sheared_stroke, yield_force_n
@@ -65,6 +66,7 @@ class ClosingStride(NamedTuple):
     extraction: Stroke
     surface: Surface
     k_p: Estimate
+    lift: float  # uncertainty of ln k_p because the insertion may have lifted the body
     deepest_m: float
     is_stuck: bool  # the flipper did not come out
     zero: Zero
@@ -84,11 +86,13 @@ class FlipperEstimator(StrideEstimator):
         base: Base = Base.FREE,
         drag_n: float = 0.0,
         surface_error_m: float = 0.001,
+        lift_n: float = inf,
         work: WorkQueue | None = None,
     ) -> None:
         self.base = base
         self.drag_n = drag_n  # of the body on each flipper
         self.surface_error_m = surface_error_m
+        self.lift_n = lift_n  # of each flipper together, that may lift the body
         self._surfaces = SurfaceMemory(surface_error_m, base is Base.FIXED)
         self._own_surfaces = SurfaceMemory(max(surface_error_m, OWN_ERROR_M), base is Base.FIXED)
         self._air = AirSwing()
@@ -114,6 +118,7 @@ class FlipperEstimator(StrideEstimator):
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
+        self._lift = 0.0  # uncertainty of ln k_p because the insertion may have lifted the body
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         if self._is_taring:
@@ -227,8 +232,12 @@ class FlipperEstimator(StrideEstimator):
         own = self._own_surfaces.update(found, 0.0)
         yield
         k_p = yield from fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        lift = 0.0
+        if self.lift_n < inf:
+            yield
+            lift = yield from lift_uncertainty(self.geometry, below, own.depth_m, self.lift_n)
         if self._strokes[Phase.INSERTION] is insertion:  # else a stop ended the stride
-            self._surface, self._k_p = surface, k_p
+            self._surface, self._k_p, self._lift = surface, k_p, lift
         self.fits = StrideFits(k_p=partial(insertion_samples, self.geometry, below, own))
         self._is_fitting = False
 
@@ -258,6 +267,7 @@ class FlipperEstimator(StrideEstimator):
             extraction=extraction,
             surface=self._surface,
             k_p=self._k_p,
+            lift=self._lift,
             deepest_m=self._deepest_m,
             is_stuck=self._stuck and self._is_held,
             zero=self._tare.zero,
@@ -281,9 +291,9 @@ class FlipperEstimator(StrideEstimator):
         )
         outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0
         return Learned(
-            k_p=_widened(_named(stride.k_p, surface), outward),
-            k_s=_named(self._shear_estimate(shear, stride), surface),
-            k_e=_widened(_named(k_e, surface), outward),
+            k_p=_widened(_named(less_deep(stride.k_p, stride.lift), surface), outward),
+            k_s=_named(less_deep(self._shear_estimate(shear, stride), SHEAR_OVER_STROKE * stride.lift), surface),
+            k_e=_widened(_named(less_deep(k_e, stride.lift), surface), outward),
             surface_m=surface.depth_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
             surface_std_error_m=surface.std_error_m,

@@ -35,16 +35,20 @@ from typing import NamedTuple
 
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS, StrideEstimate
-from estimation.strokes.depth_line import REMEMBERED_STRIDES, DepthLaw, Line, Reading, common_variance, reading_of
+from estimation.strokes.depth_line import (
+    REMEMBERED_STRIDES,
+    SHEAR_LAW,
+    STROKE_LAW,
+    DepthLaw,
+    Line,
+    Reading,
+    common_variance,
+    reading_of,
+)
 
 CHANGE = 2.6  # standard deviations beyond which a stride is no chance
 PAIR_CHANGE = 2.8  # of two strides: a second test as frequent as the first must not add as many false alarms
 FLIPPER_SPREAD = 0.05  # each flipper's lasting error, mostly of its torque constant, in the same mud
-# A force exponent from 1 (the same pressure everywhere) to 2 (the paper's triangle), where k_s assumes 2.
-# The theory of undrained clay spans it between 20 and 50 mm (docs/explanation/estimation.md).
-SHEAR_LAW = DepthLaw(-0.5, 0.3)
-# 0.5 to 1 in the authors' logs (end bearing and adhesion), where k_p and k_e assume 1.
-STROKE_LAW = DepthLaw(-0.4, 0.3)
 
 
 class SameMud(NamedTuple):

@@ -8,11 +8,13 @@ or from a log, however many units run in a tick. Two methods share the interface
 """
 
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work, WorkQueue, finish
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
+from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import (
     FLIPPERS,
     NO_LOAD,
@@ -31,6 +33,7 @@ from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
 from estimation.strokes.fit_samples import StrideFits
+from estimation.strokes.lift import LIFTING_FRACTION
 from estimation.strokes.shear import Base
 
 PAPER_DRAG_N = 2.5  # the body's drag on its rail in the paper
@@ -58,12 +61,17 @@ class MudEstimator:
         parameters: EstimationParameters = EstimationParameters(),  # noqa: B008 - immutable
         body_drag_n: float = PAPER_DRAG_N,
         rig: Rig = TWO_FLIPPERS,
+        body_mass_kg: float = 0.0,
     ) -> None:
-        """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body."""
+        """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body.
+
+        `body_mass_kg` counts for a free body, and is 0 where it is unknown.
+        """
         drag_n = body_drag_n / len(rig.flippers)
+        lift_n = LIFTING_FRACTION * body_mass_kg * GRAVITY_M_S2 / len(rig.flippers) if parameters.free_body else inf
         self.work = WorkQueue()  # of the ends of insertions
         self.flippers = tuple(
-            _flipper_estimator(flipper, geometry, drive, parameters, drag_n, self.work)
+            _flipper_estimator(flipper, geometry, drive, parameters, drag_n, lift_n, self.work)
             for flipper, drive in zip(rig.flippers, drives, strict=True)
         )
         self._knowledge = MudKnowledge()
@@ -132,9 +140,10 @@ def _flipper_estimator(
     drive: FlipperDrive,
     parameters: EstimationParameters,
     drag_n: float,
+    lift_n: float,
     work: WorkQueue,
 ) -> FlipperEstimator | PaperEstimator:
     if parameters.method == "paper":
         return PaperEstimator(flipper, geometry, drive, drag_n if parameters.paper.compensation else 0.0, work)
     base = Base.FIXED if parameters.fixed_base else Base.FREE
-    return FlipperEstimator(flipper, geometry, drive, base, drag_n, parameters.surface_error_m, work)
+    return FlipperEstimator(flipper, geometry, drive, base, drag_n, parameters.surface_error_m, lift_n, work)

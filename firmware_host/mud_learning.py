@@ -72,6 +72,7 @@ class MudLearning:
             configuration.estimation,
             configuration.adaptation.body_drag_n,
             configuration.rig,
+            configuration.adaptation.body_mass_kg,
         )
         self._configuration = configuration
         self._gait = configuration.gait

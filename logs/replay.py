@@ -107,12 +107,13 @@ class RunningReplay:
         """Raises LogError where the log has no usable configuration, or is of another robot than the given one."""
         configuration = configuration or configuration_of(path, log.configuration_text)
         parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
-        drag_n, rig = configuration.adaptation.body_drag_n, configuration.rig
+        body, rig = configuration.adaptation, configuration.rig
         if rig != log.rig:
             own, given = list(log.rig.flippers), list(rig.flippers)
             raise LogError(f"{path}: is of a robot with rig.flippers = {own}, not {given} as in the configuration")
         self._log, self._flippers = log, rig.flippers
-        self._estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n, rig)
+        known = configuration.geometry, configuration.flipper_drives, parameters
+        self._estimator = MudEstimator(*known, body.body_drag_n, rig, body.body_mass_kg)
         self._strides: list[StrideEstimate] = []
         self._fits: list[StrideFits] = []
         self._mode_before = -1
@@ -195,11 +196,11 @@ def lab_estimator(
 ) -> MudEstimator:
     """Return an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
 
-    A single flipper was mounted on a fixed bench; two flippers carried a body.
+    A single flipper was mounted on a fixed bench; two flippers carried a body without a rail, whose mass is unknown.
     """
     geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE,) * len(FLIPPERS), EstimationParameters()
     if len(lab.flippers) > 1:
-        parameters = replace(parameters, surface_error_m=UNEVEN_M)
+        parameters = replace(parameters, surface_error_m=UNEVEN_M, free_body=True)
     if configuration:
         geometry, parameters = configuration.geometry, configuration.estimation
         own = dict(zip(configuration.rig.flippers, configuration.flipper_drives, strict=True))
@@ -209,8 +210,9 @@ def lab_estimator(
     parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
     if surface_error_m is not None:
         parameters = replace(parameters, surface_error_m=surface_error_m)
-    drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
-    return MudEstimator(geometry, limited, parameters, drag_n)
+    body = configuration.adaptation if configuration else None
+    drag_n, mass_kg = (body.body_drag_n, body.body_mass_kg) if body else (PAPER_DRAG_N, 0.0)
+    return MudEstimator(geometry, limited, parameters, drag_n, body_mass_kg=mass_kg)
 
 
 def lab_readings(estimator: MudEstimator, lab: LabLog) -> Iterator[tuple[float, MudReading]]:

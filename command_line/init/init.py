@@ -28,7 +28,7 @@ from firmware_host.configuration.loading import parse_configuration
 T = TypeVar("T")
 PRINTED = Path("-")
 FLIPPER_SETS = (*FLIPPERS, "both")
-BASES = ("fixed", "moves")
+BASES = ("fixed", "rail", "free")
 RECTANGLE = "rectangle"
 SIDES = ("plate_width_m", "plate_height_m")
 
@@ -68,7 +68,7 @@ def init(
     defaults: Annotated[bool, Option("ask nothing")] = False,
     name: Annotated[str | None, Option("of the robot, in its logs")] = None,
     flippers: Annotated[str | None, Option("one with two motors, or both with four", choices=FLIPPER_SETS)] = None,
-    base: Annotated[str | None, Option("a bench, or a body that the flippers move", choices=BASES)] = None,
+    base: Annotated[str | None, Option("a bench, a body on a rail, or a free body", choices=BASES)] = None,
     drive: Annotated[str | None, Option("protocol of the drives", choices=tuple(DRIVE_TYPES))] = None,
     interface: Annotated[str | None, Option("of python-can, such as socketcan", parse=interface_name)] = None,
     from_bus: Annotated[bool, Option("search its channels for drives, and write what is found")] = False,
@@ -85,8 +85,8 @@ def init(
     try:
         name = name or ask("name of the robot", NewRobot().name, str)
         wanted = flippers or ask("flippers: left, right or both", "both", one_of(FLIPPER_SETS))
-        base = base or ask("base: fixed or moves", "moves", one_of(BASES))
-        robot = NewRobot(name, Rig(FLIPPERS if wanted == "both" else (wanted,)), base == "fixed")
+        base = base or ask("base: fixed, rail or free", NewRobot().base, one_of(BASES))
+        robot = NewRobot(name, Rig(FLIPPERS if wanted == "both" else (wanted,)), base)
         if not from_bus:
             types = tuple(DRIVE_TYPES)
             robot = robot._replace(drive_type=drive or ask(f"drives: {' or '.join(types)}", DEFAULT, one_of(types)))

@@ -30,7 +30,7 @@ class NewRobot(NamedTuple):
 
     name: str = "mudskipper"
     rig: Rig = TWO_FLIPPERS
-    fixed_base: bool = False
+    base: str = "free"  # or on a rail, or fixed
     drive_type: str = DEFAULT
     interface: str = "socketcan"
     channels: tuple[str, ...] = ("can0",)  # one for all flippers, or one for each
@@ -79,7 +79,7 @@ def _identity(robot: NewRobot, joint: str) -> dict[str, str]:
 
 
 def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
-    alone = robot.fixed_base and len(robot.rig.flippers) == 1
+    alone = robot.base == "fixed" and len(robot.rig.flippers) == 1
     asked = DRIVE_TYPES[robot.drive_type].parameters.answers_only
     return {
         "robot": {"name": robot.name},
@@ -87,7 +87,7 @@ def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
         "geometry": _geometry(robot.geometry),
         "gait": {"protocol": "single_flipper" if alone else "walking"},
         **({"gains": asdict(GAINS_OF_ASKED_DRIVES)} if asked else {}),
-        "estimation": {"fixed_base": robot.fixed_base},
+        "estimation": {"fixed_base": robot.base == "fixed", "free_body": robot.base == "free"},
         "adaptation": _adaptation(robot.geometry),
     }
 
@@ -106,6 +106,7 @@ def _adaptation(geometry: FlipperGeometry) -> dict[str, Any]:
         "initial_depth_m": min(usual.initial_depth_m, deepest_m),
         "min_depth_m": min(usual.min_depth_m, deepest_m),
         "max_depth_m": deepest_m,
+        "body_mass_kg": usual.body_mass_kg,
         "motor_force_n": min(usual.motor_force_n, most_n),
     }
 

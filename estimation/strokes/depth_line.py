@@ -35,6 +35,13 @@ class DepthLaw(NamedTuple):
     std_error: float
 
 
+# A force exponent from 1 (the same pressure everywhere) to 2 (the paper's triangle), where k_s assumes 2.
+# The theory of undrained clay spans it between 20 and 50 mm (docs/explanation/estimation.md).
+SHEAR_LAW = DepthLaw(-0.5, 0.3)
+# 0.5 to 1 in the authors' logs (end bearing and adhesion), where k_p and k_e assume 1.
+STROKE_LAW = DepthLaw(-0.4, 0.3)
+
+
 class Reading(NamedTuple):
     """One coefficient of one stride, in logarithms."""
 

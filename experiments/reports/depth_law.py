@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from pandas import DataFrame
 
-from estimation.knowledge import SHEAR_LAW, STROKE_LAW
-from estimation.strokes.depth_line import REPEATABILITY
+from estimation.strokes.depth_line import REPEATABILITY, SHEAR_LAW, STROKE_LAW
 
 FEWEST = 4  # strides: two of them determine any line
 NARROWEST = 1.15  # deepest over shallowest stride: over less a line of ln k has no slope

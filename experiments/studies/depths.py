@@ -11,7 +11,7 @@ from pandas import DataFrame
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from estimation.knowledge import SHEAR_LAW, STROKE_LAW
+from estimation.strokes.depth_line import SHEAR_LAW, STROKE_LAW
 from experiments.reports.depth_law import fit_depth_law
 from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.study.option import Option

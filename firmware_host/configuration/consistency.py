@@ -51,6 +51,8 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     yield from drive_problems(configuration)
     yield from bus_problems(configuration)
     yield from _plate_problems(configuration.geometry)
+    if configuration.estimation.fixed_base and configuration.estimation.free_body:
+        yield "estimation.free_body = true: no body on a fixed base is free; remove it or estimation.fixed_base"
     yield from _motor_force_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)

@@ -17,10 +17,12 @@ from hypothesis import strategies as st
 
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.records import FLIPPERS, Estimate, StrideEstimate
-from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, SHEAR_LAW, STROKE_LAW, MudKnowledge
+from estimation.knowledge import CHANGE, FLIPPER_SPREAD, PAIR_CHANGE, MudKnowledge
 from estimation.strokes.depth_line import (
     REMEMBERED_STRIDES,
     REPEATABILITY,
+    SHEAR_LAW,
+    STROKE_LAW,
     SURE_EXPONENT,
     DepthLaw,
     Line,
