@@ -6,7 +6,7 @@ tests; here each flipper must give what it would give alone.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import nan
+from math import inf, nan
 
 import pytest
 
@@ -116,6 +116,16 @@ def test_the_paper_adds_the_drag_only_if_configured() -> None:
     left = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0).flippers[0]
     assert isinstance(left, PaperEstimator)
     assert left.drag_n == 3.5
+
+
+@pytest.mark.parametrize(("free_body", "mass_kg", "lift_n"), [(False, 1.0, inf), (True, 1.0, 2.45), (True, 0.0, 0.0)])
+def test_a_free_body_is_lifted_by_half_of_its_weight_and_one_of_unknown_mass_by_any_force(
+    free_body: bool, mass_kg: float, lift_n: float
+) -> None:
+    parameters = EstimationParameters(free_body=free_body)
+    for flipper in MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, body_mass_kg=mass_kg).flippers:
+        assert isinstance(flipper, FlipperEstimator)
+        assert flipper.lift_n == pytest.approx(lift_n, rel=0.01)
 
 
 @pytest.mark.parametrize(("fixed_base", "base"), [(False, Base.FREE), (True, Base.FIXED)])

@@ -46,7 +46,7 @@ def answered(lines: Sequence[str], *arguments: str) -> tuple[NewRobot, list[str]
 
 @pytest.mark.parametrize("flippers", ["left", "right", "both"])
 @pytest.mark.parametrize("drive", list(DRIVE_TYPES))
-@pytest.mark.parametrize("base", ["fixed", "moves"])
+@pytest.mark.parametrize("base", ["fixed", "rail", "free"])
 def test_every_rig_with_every_drive_is_accepted(tmp_path: Path, flippers: str, drive: str, base: str) -> None:
     path = tmp_path / "robot.toml"
     assert main(["init", str(path), "--flippers", flippers, "--drive", drive, "--base", base]) == exit_codes.OK
@@ -54,7 +54,8 @@ def test_every_rig_with_every_drive_is_accepted(tmp_path: Path, flippers: str, d
     assert configuration.rig.flippers == (("left", "right") if flippers == "both" else (flippers,))
     assert tuple(configuration.drive) == configuration.rig.joints
     assert {each.type for each in configuration.drive.values()} == {drive}
-    assert configuration.estimation.fixed_base is (base == "fixed")
+    known = configuration.estimation
+    assert (known.fixed_base, known.free_body) == (base == "fixed", base == "free")
 
 
 @pytest.mark.parametrize("drive", list(DRIVE_TYPES))

@@ -158,6 +158,7 @@ def test_a_wrong_value_is_refused_by_its_key(example_text: str, old: str, new: s
         ("initial_depth_m", "0.06", "adaptation.initial_depth_m = 0.06: must be from"),
         ("min_depth_m", "0.06", "adaptation.min_depth_m = 0.06: must be at most adaptation.max_depth_m"),
         ("sign", "0", "drive.left_sweep.sign = 0: must be 1 or -1"),
+        ("free_body", "true\nfixed_base = true", "estimation.free_body = true: no body on a fixed base is free"),
     ],
 )
 def test_a_value_that_contradicts_another_is_refused(example_text: str, key: str, value: str, message: str) -> None:
