@@ -165,7 +165,7 @@ def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]
     return 1 if failed else 0
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     actions = parser.add_subparsers(dest="action", required=True)
     recording = actions.add_parser("record", help="write what this version does")
@@ -178,7 +178,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     comparing.add_argument("new", type=Path)
     comparing.add_argument("--renamed", action="append", default=[], metavar="OLD=NEW")
     comparing.add_argument("--ignore", action="append", default=[], metavar="NAME")
-    options = parser.parse_args(arguments)
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = _options(arguments)
     if options.action == "record":
         return record(options.folder, options.data, options.only)
     names = dict(pair.split("=", 1) for pair in options.renamed)

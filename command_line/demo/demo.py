@@ -109,13 +109,14 @@ def summarise(report: Report, demonstration: Demo, log_path: Path, plot_path: Pa
     rows = read_log(log_path, fields=("mode", "stamp_s", "body_x_m")).ticks
     walked = rows[(rows["mode"] == Mode.WALKING) & np.isfinite(rows["body_x_m"])]
     stamps_s, positions_m, track = walked["stamp_s"], walked["body_x_m"], demonstration.track
-    strides = []
-    for stride in demonstration.strides:
+
+    def mud_of(stride: Report) -> str:
         start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(walked) else 0.0
-        strides.append(stride | {"mud": track.ground_at(start_m + LEAD_M).name})
+        return track.ground_at(start_m + LEAD_M).name
+
     return {
         **report["loop"],
-        "strides": strides,
+        "strides": [stride | {"mud": mud_of(stride)} for stride in demonstration.strides],
         "speed_cm_s": speeds_cm_s(stamps_s, positions_m, track),
         "dropped_rows": report["log"]["dropped"],
         "warnings": report["warnings"],

@@ -149,15 +149,16 @@ def _examine_rates(name: str, bus: BusParameters, link: CanLink) -> Iterator[Fin
     if data_kbit_s and link.carries_fd is not None:
         text = f"{link.name} {'carries' if link.carries_fd else 'does not carry'} CAN FD frames"
         yield ok_if(link.carries_fd, f"fd.{name}", text, fix_fd, Level.FAIL)
-    for line, verb, actual_bit_s, expected_kbit_s, advice in (
-        ("bit_rate", "runs", link.bit_rate_bit_s, wanted_kbit_s, fix),
-        ("data_bit_rate", "sends data", link.data_bit_rate_bit_s, data_kbit_s, fix_fd),
-    ):
-        if actual_bit_s and expected_kbit_s:
-            right = actual_bit_s == 1000 * expected_kbit_s
-            text = f"{link.name} {verb} at {actual_bit_s / 1000:g} kbit/s"
-            text += "" if right else f", its drives at {expected_kbit_s}"
-            yield ok_if(right, f"{line}.{name}", text, advice, Level.FAIL)
+    rate, data_rate = f"{link.name} runs at", f"{link.name} sends data at"
+    yield from _compare_rates(f"bit_rate.{name}", rate, link.bit_rate_bit_s, wanted_kbit_s, fix)
+    yield from _compare_rates(f"data_bit_rate.{name}", data_rate, link.data_bit_rate_bit_s, data_kbit_s, fix_fd)
+
+
+def _compare_rates(line: str, verb: str, actual_bit_s: int, expected_kbit_s: int, fix: str) -> Iterator[Finding]:
+    if actual_bit_s and expected_kbit_s:
+        is_right = actual_bit_s == 1000 * expected_kbit_s
+        others = "" if is_right else f", its drives at {expected_kbit_s}"
+        yield ok_if(is_right, line, f"{verb} {actual_bit_s / 1000:g} kbit/s{others}", fix, Level.FAIL)
 
 
 def _examine_load(name: str, bus: BusParameters, drives: Sequence[DriveParameters], link: CanLink | None) -> Finding:

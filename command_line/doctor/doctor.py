@@ -41,7 +41,9 @@ from command_line.doctor.host_facts import (
 from command_line.json_output import Answer
 from command_line.screen import GREEN, RED, YELLOW, coloured
 from command_line.shared_options import DEFAULT_CONFIG
+from control.records import DriveStates
 from drivers.drive_types import make_drives
+from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSourceError
 from experiments.study.option import Option
 from firmware_host.buses import BusError, open_ports
@@ -186,15 +188,17 @@ def _examine_groups(configuration: Configuration, socket: Path) -> Iterator[Find
         load_rights(configuration.status)
     except ConfigurationError as problem:
         yield from (fail("groups", message, "make the group, or leave the key out") for message in problem.problems)
-        return
-    name = configuration.status.drive_group or OURS
+    else:
+        yield _examine_members(configuration.status.drive_group or OURS)
+
+
+def _examine_members(group: str) -> Finding:
     try:
-        members = grp.getgrnam(name).gr_mem
+        members = grp.getgrnam(group).gr_mem
     except KeyError:
-        yield warn("groups", f"there is no group {name}", "'mudskipper install' makes it")
-        return
-    text = f"operators are the members of {name}: {', '.join(members) or 'only root'}"
-    yield ok_if(bool(members), "groups", text, f"'adduser YOU {name}', then log in again")
+        return warn("groups", f"there is no group {group}", "'mudskipper install' makes it")
+    text = f"operators are the members of {group}: {', '.join(members) or 'only root'}"
+    return ok_if(bool(members), "groups", text, f"'adduser YOU {group}', then log in again")
 
 
 def _group_name(gid: int) -> str:
@@ -212,6 +216,16 @@ def check_without_daemon(path: Path, why_no_daemon: str) -> list[dict[str, Any]]
     return [each.as_check_item for each in (fail("daemon", why_no_daemon, fix), *findings)]
 
 
+def _listen(drives: Drives) -> DriveStates:
+    deadline_s = time.monotonic() + LISTENING_S
+    states = drives.read(time.monotonic())
+    while not drives.heard and time.monotonic() < deadline_s:
+        drives.poll()
+        time.sleep(0.01)
+        states = drives.read(time.monotonic())
+    return states
+
+
 def examine_drives(configuration: Configuration) -> list[Finding]:
     """Return which drives are heard."""
     try:
@@ -221,12 +235,7 @@ def examine_drives(configuration: Configuration) -> list[Finding]:
     with closing(
         make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
     ) as drives:
-        deadline_s = time.monotonic() + LISTENING_S
-        states = drives.read(time.monotonic())
-        while not drives.heard and time.monotonic() < deadline_s:
-            drives.poll()
-            time.sleep(0.01)
-            states = drives.read(time.monotonic())
+        states = _listen(drives)
     fix = "check its power, wiring, node id and cyclic message periods"
     return [
         ok_if(state.heard, f"drive.{joint}", "heard" if state.heard else "not heard", fix, Level.FAIL)

@@ -42,21 +42,23 @@ def write_backup(path: Path, setups: list[JointSetup], changes: Mapping[str, Map
     """Write the file whole, and wait until the disk has it. Raises OSError."""
     document = tomlkit.document()
     document.add(tomlkit.comment(HEAD.format(f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC")))
-    for setup in setups:
-        old = {key: setup.values[key] for key in changes[setup.joint]}
-        found = setup.found
-        document[setup.joint] = {
-            "type": found.type,
-            "node_id": found.node_id,
-            "serial_number": found.serial_number,
-            "firmware": found.firmware,
-            "old": old,
-            "new": dict(changes[setup.joint]),
-        }
+    document.update({setup.joint: _drive_table(setup, changes[setup.joint]) for setup in setups})
     with whole_file(path) as hidden, hidden.open("w", encoding="utf-8") as file:
         file.write(tomlkit.dumps(document))
         file.flush()
         os.fsync(file.fileno())
+
+
+def _drive_table(setup: JointSetup, new: Mapping[str, float]) -> dict[str, Any]:
+    found = setup.found
+    return {
+        "type": found.type,
+        "node_id": found.node_id,
+        "serial_number": found.serial_number,
+        "firmware": found.firmware,
+        "old": {key: setup.values[key] for key in new},
+        "new": dict(new),
+    }
 
 
 def read_backup(path: Path) -> dict[str, Backup]:

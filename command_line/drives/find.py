@@ -89,8 +89,5 @@ def _lines(report: Mapping[str, Any]) -> Iterator[str]:
     for problem in report["problems"]:
         yield f"{coloured('FAIL', RED)} {problem}"
     if drives and not report["problems"]:
-        yield (
-            coloured("ok", GREEN)
-            + "   every id answers once"
-            + (", every configured drive answers" if any(drive["joint"] for drive in drives) else "")
-        )
+        configured = ", every configured drive answers" if any(drive["joint"] for drive in drives) else ""
+        yield f"{coloured('ok', GREEN)}   every id answers once{configured}"

@@ -49,6 +49,13 @@ from operator_client.status_client import CallRefusedError
 
 NEEDED = ("matplotlib", "pandas", "pyarrow")
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
+END_STATUS: Mapping[type[BaseException], int] = {
+    DaemonLostError: exit_codes.NO_DAEMON,
+    AccessDeniedError: exit_codes.NOT_PERMITTED,
+    KeyboardInterrupt: exit_codes.INTERRUPTED,
+    WorkersError: exit_codes.UNHEALTHY,
+    OSError: exit_codes.UNHEALTHY,  # such as a full disk
+}
 Values = dict[str, Any]
 Function = Callable[..., Any]
 
@@ -261,19 +268,13 @@ def make_workers(
 
 
 def _end_early(folder: Path, problem: BaseException) -> int:
-    message, status = str(problem), exit_codes.REFUSED
-    match problem:
-        case DaemonLostError():
-            status = exit_codes.NO_DAEMON
-        case AccessDeniedError():
-            status = exit_codes.NOT_PERMITTED
-        case KeyboardInterrupt():
-            message, status = "interrupted", exit_codes.INTERRUPTED
-        case WorkersError():
-            status = exit_codes.UNHEALTHY
-        case OSError():  # such as a full disk
-            message, status = why_not(problem, folder), exit_codes.UNHEALTHY
-    complain(message)
+    complain(_explain_end(folder, problem))
     if count_entries(folder):
         complain(f"the measurements so far are in {folder}; the same command with --out {folder} continues from there")
-    return status
+    return next((status for kind, status in END_STATUS.items() if isinstance(problem, kind)), exit_codes.REFUSED)
+
+
+def _explain_end(folder: Path, problem: BaseException) -> str:
+    if isinstance(problem, KeyboardInterrupt):
+        return "interrupted"
+    return why_not(problem, folder) if isinstance(problem, OSError) else str(problem)

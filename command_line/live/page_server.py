@@ -220,9 +220,8 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/can_stop":
             self._answer(*self.server.status.answer())
         elif self.path in ("/note", "/mark"):
-            self._answer(
-                HTTPStatus.OK, send_order(self.server.status_socket, self.path[1:], text=self._text()).encode()
-            )
+            answer = send_order(self.server.status_socket, self.path[1:], text=self._text())
+            self._answer(HTTPStatus.OK, answer.encode())
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 

@@ -127,17 +127,22 @@ def opened_pad(device: str, keyboard: bool) -> Iterator[Pad]:
             print(TERMINAL_KEYS_TEXT)
             yield pad
         return
-    found = [device] if device else find_devices("BTN_SOUTH")
+    keys = InputKeys(device or _find_gamepad(), DEVICE_KEYS)
+    if DEAD_MAN not in {DEVICE_KEYS[name] for name in keys.keys}:
+        raise CommandError(f"{keys.name} has no dead-man: neither BTN_TR nor KEY_SPACE")
+    print(f"{keys.name}: {GAMEPAD_KEYS}")
+    yield device_pad(keys)
+
+
+def _find_gamepad() -> str:
+    """Return the only gamepad. Raises CommandError."""
+    found = find_devices("BTN_SOUTH")
     if len(found) != 1:
         raise CommandError(
             f"{len(found)} gamepads are connected: {', '.join(found) or 'none in /dev/input that this user may read'};"
             " name one with --device, or drive with --keyboard"
         )
-    keys = InputKeys(found[0], DEVICE_KEYS)
-    if DEAD_MAN not in {DEVICE_KEYS[name] for name in keys.keys}:
-        raise CommandError(f"{keys.name} has no dead-man: neither BTN_TR nor KEY_SPACE")
-    print(f"{keys.name}: {GAMEPAD_KEYS}")
-    yield device_pad(keys)
+    return found[0]
 
 
 def joy(

@@ -38,10 +38,7 @@ def status_text(report: Report) -> str:
     parts: list[Part] = [(f"{report['robot']}: ", ""), (mode_word(report), style), (f", {position}\n", "")]
     if report["mode"] == "boot":
         parts.append((f"{unheard_text(report) or 'every drive was heard'}\n", WARNING))
-    for cause in report["causes"]:
-        consequences = consequences_text(cause)
-        lines = [cause_text(cause), *filter(None, [consequences and f"    and {consequences}"])]
-        parts.append(("\n".join([*lines, f"    -> {cause['what_to_do']}\n"]), style_of(cause)))
+    parts += [(_cause_lines(cause), style_of(cause)) for cause in report["causes"]]
     parts += [(f"warning: {notice}\n", WARNING) for notice in notices(report)]
     drives = [{head: cell for head, (cell, _) in drive_cells(drive).items()} for drive in report["drives"]]
     parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
@@ -50,3 +47,9 @@ def status_text(report: Report) -> str:
     if (log := report["log"])["path"]:
         parts.append((f"\nquota  {quota_text(log['quota_bytes'], log['min_free_fraction'])}", ""))
     return plain(parts)
+
+
+def _cause_lines(cause: Report) -> str:
+    consequences = consequences_text(cause)
+    lines = [cause_text(cause), *filter(None, [consequences and f"    and {consequences}"])]
+    return "\n".join([*lines, f"    -> {cause['what_to_do']}\n"])

@@ -133,18 +133,21 @@ class RosNode:
         other = read_token(str(sample.key_expr))
         if other is None or sample.kind != zenoh.SampleKind.PUT:
             return
-        own = self._own.get(other.name, self._node)
-        problem = ""
-        if other.domain != self._node.domain:
-            problem = (
-                f"{other.node} is in domain {other.domain}, this program in {self._node.domain}, so they do not meet:"
-                f" use --domain {other.domain}, or ROS_DOMAIN_ID={self._node.domain} there"
-            )
-        elif other.kind == PEERS.get(own.kind) and other[-2:] != own[-2:]:
-            problem = (
-                f"{other.node} uses {own.name} as {other.type_name} {other.type_hash}, this program as {own.type_name}"
-                f" {own.type_hash}, so they do not meet: see --distribution, or install this version's mudskipper_msgs"
-            )
+        problem = _why_not_met(self._own.get(other.name, self._node), other)
         if problem and problem not in self._said:
             self._said.add(problem)
             complain(problem)
+
+
+def _why_not_met(own: Endpoint, other: Endpoint) -> str:
+    if other.domain != own.domain:
+        return (
+            f"{other.node} is in domain {other.domain}, this program in {own.domain}, so they do not meet:"
+            f" use --domain {other.domain}, or ROS_DOMAIN_ID={own.domain} there"
+        )
+    if other.kind == PEERS.get(own.kind) and other[-2:] != own[-2:]:
+        return (
+            f"{other.node} uses {own.name} as {other.type_name} {other.type_hash}, this program as {own.type_name}"
+            f" {own.type_hash}, so they do not meet: see --distribution, or install this version's mudskipper_msgs"
+        )
+    return ""

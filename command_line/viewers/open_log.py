@@ -31,16 +31,15 @@ def open_log(
     ],
 ) -> int:
     _require_finished(log)
+    programs: Sequence[str] = (viewer,)
+    arguments, install = [str(log)], "install Rerun (pip install rerun-sdk)"
     if viewer == "foxglove":
-        program = next(filter(None, map(which, FOXGLOVE_PROGRAMS)), None)
+        programs, install = FOXGLOVE_PROGRAMS, "install Lichtblick (free) or Foxglove"
         print(f"the layout: menu View, 'Import layout from file', {LAYOUTS / 'foxglove.json'}")
-        return _start(program, [str(log)], f"neither Lichtblick (free) nor Foxglove is installed: open {log} in one")
     if viewer == "plotjuggler":
-        arguments = ["-d", str(log), "-l", str(LAYOUTS / "plotjuggler.xml")]
-        return _start(
-            which("plotjuggler"), arguments, f"install PlotJuggler, then: plotjuggler {shlex.join(arguments)}"
-        )
-    return _start(which("rerun"), [str(log)], f"install Rerun (pip install rerun-sdk), then: rerun {log}")
+        arguments, install = ["-d", str(log), "-l", str(LAYOUTS / "plotjuggler.xml")], "install PlotJuggler"
+    program = next(filter(None, map(which, programs)), None)
+    return _start(program, arguments, f"{install}, then: {shlex.join([programs[0], *arguments])}")
 
 
 def _require_finished(path: Path) -> None:

@@ -97,16 +97,19 @@ def walk_text(history: History) -> Text:
     known = reason.removesuffix(SLIPS)
     why = REASONS.get(known, known) + ("; it will slip" if reason.endswith(SLIPS) else "")
     depths = f"{cm(report['depth_m'], 2)} cm now, {cm(report['next_depth_m'], 2)} cm next: " if walks else "-"
-    slip, step_m = None, history.step_m
-    if step_m is not None and report["full_step_m"] > 0.0:
-        slip = max(0.0, 1.0 - step_m / report["full_step_m"])
+    slip = _slip(history)
     stride = f"stride {report['stride']}, {report['phase']}" if walks else "no stride"
     return Text.assemble(
         ("depth   ", "bold"), depths, (why if walks else "", "dim"),
-        ("\nwalk    ", "bold"), f"{stride}; step {cm(step_m)} cm, slip ",
+        ("\nwalk    ", "bold"), f"{stride}; step {cm(history.step_m)} cm, slip ",
         (f"{number(None if slip is None else 100.0 * slip, 0)} %", WARNING if slip and slip > SLIPPING else ""),
         f", speed {cm(history.speed_m_s)} cm/s, at {number(report['body_x_m'], 2)} m",
     )  # fmt: skip
+
+
+def _slip(history: History) -> float | None:
+    full_step_m = history.status["full_step_m"]
+    return max(0.0, 1.0 - history.step_m / full_step_m) if history.step_m is not None and full_step_m > 0.0 else None
 
 
 def drive_rows(history: History, silence_s: float) -> list[Row]:

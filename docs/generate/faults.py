@@ -8,7 +8,7 @@ from control.rate import PERIOD_S
 from docs.generate.markdown import code, table
 from drivers.fault_injection.failure_table import EFFECTS
 from experiments.robot.lockstep_robot import simulated_configuration
-from verification.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
+from verification.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, EnergyBounds, energy_bounds
 
 REACTIONS = {
     Reaction.NONE: "nothing; the fault only prevents arming",
@@ -33,21 +33,20 @@ def modes() -> Iterator[str]:
 
 def faults() -> Iterator[str]:
     bounds = energy_bounds(simulated_configuration())
-    rows = [
-        (
-            code(kind),
-            kind.meaning,
-            _name(kind.reaction),
-            str(kind.bound_ticks),
-            f"{bounds.fault_j(kind):.1f}" if kind.reaction in STOPPING else "",
-            BLOCKS[kind.blocks],
-            ENDS[kind.clears],
-            kind.what_to_do,
-        )
-        for kind in FaultKind
-    ]
-    yield from table(
-        ("fault", "meaning", "reaction", "ticks", "energy (J)", "prevents arming", "ends", "what to do"), rows
+    head = ("fault", "meaning", "reaction", "ticks", "energy (J)", "prevents arming", "ends", "what to do")
+    yield from table(head, [_fault_row(kind, bounds) for kind in FaultKind])
+
+
+def _fault_row(kind: FaultKind, bounds: EnergyBounds) -> tuple[str, ...]:
+    return (
+        code(kind),
+        kind.meaning,
+        _name(kind.reaction),
+        str(kind.bound_ticks),
+        f"{bounds.fault_j(kind):.1f}" if kind.reaction in STOPPING else "",
+        BLOCKS[kind.blocks],
+        ENDS[kind.clears],
+        kind.what_to_do,
     )
 
 

@@ -108,12 +108,17 @@ def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others
         idle_s = next((sample.tick.now_s - pressed[-1].tick.now_s for sample in first_idle), nan)
         yield BenchReading(f"{joint}: idle {when}", idle_s, "s", earliest_s, latest_s, todo)
         if "adduction" in joint and not others:
-            flowed_a = np.mean(signals(pressed[-40:], "current_a")[:, index])
-            low = signals(silence, "current_a")[:, index] / flowed_a < GONE_FRACTION
-            first = first_lasting(silence, low, GONE_TICKS)
-            seen_s = nan if first is None else first.tick.now_s - pressed[-1].tick.now_s
+            seen_s = _current_gone_s(pressed, silence, index)
             latest_s = latest_s if drive.holds_idle_current else gone_s
             yield BenchReading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
+
+
+def _current_gone_s(pressed: Sequence[TickSample], silence: Sequence[TickSample], index: int) -> float:
+    """Return how long after the last command the current of a drive had gone; NaN if it did not."""
+    flowed_a = np.mean(signals(pressed[-40:], "current_a")[:, index])
+    low = signals(silence, "current_a")[:, index] / flowed_a < GONE_FRACTION
+    first = first_lasting(silence, low, GONE_TICKS)
+    return nan if first is None else first.tick.now_s - pressed[-1].tick.now_s
 
 
 def _longest_s(test_rig: TestRig) -> float:

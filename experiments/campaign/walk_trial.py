@@ -72,9 +72,8 @@ def _walk(planned: PlannedWalk, recorder: MemoryRecorder, seed: int) -> None:
         plant=world.plant(configuration),
         drives=world.drives(configuration),
     )
-    lockstep.arm(
-        forced="" if all(drive.knows_watchdog for drive in configuration.drive.values()) else "watchdog_unknown"
-    )
+    knows_watchdogs = all(drive.knows_watchdog for drive in configuration.drive.values())
+    lockstep.arm(forced="" if knows_watchdogs else "watchdog_unknown")
     lockstep.walk(planned.order)
     strides = planned.limits.strides * len(configuration.rig.flippers)
     rows, loop = recorder.rows[STRIDE_KIND], lockstep.loop

@@ -53,7 +53,7 @@ def repeatability(strokes: DataFrame) -> dict[str, Any]:
         "chi_between_trials": trials.chi,
         "chi_between_strokes": later_strokes.chi,
     }
-    return {name: None if value is None else round(value, 4) for name, value in found.items()} | {
+    return _rounded(found) | {
         "n": len(first),  # trials with a first value
         "n_later": len(later),
         "first_mean": round(float(first.mean())) if len(first) else None,  # N/m³
@@ -75,8 +75,11 @@ def walk_scatter(coefficient: str, strides: DataFrame) -> dict[str, Any]:
         "exponent": law.exponent if law else None,
         "exponent_std_error": law.std_error if law else None,
     }
-    rounded = {name: None if value is None else round(value, 4) for name, value in found.items()}
-    return rounded | {"finding": law_finding(coefficient, law)}
+    return _rounded(found) | {"finding": law_finding(coefficient, law)}
+
+
+def _rounded(found: dict[str, float | None]) -> dict[str, Any]:
+    return {name: None if value is None else round(value, 4) for name, value in found.items()}
 
 
 def scatter_about_mean(known: DataFrame) -> Scatter:

@@ -16,6 +16,7 @@ from drivers.load_cell.calibration import (
     write_calibration,
 )
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
+from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoderSettings
 from drivers.serial.serial_line import SerialLine, text_fraction
 from experiments.loadcell.recording import CellBench
@@ -126,11 +127,7 @@ def _require_text(bench: CellBench, line: SerialLine, device: str, option: str, 
 
 def _find_calibration(bench: CellBench, cell: CellSettings) -> LoadCellCalibration:
     """Take the given file, the unit's own scale or the folder's file, or calibrate now. Raises BenchError."""
-    port = bench.port
-    readings = filter(None, (port.line_format.decode(line) for line in port.line.recent))
-    units = Counter(reading.unit for reading in readings if reading.unit)
-    unit = cell.unit or max(units, key=units.__getitem__, default=COUNTS)  # that of most lines
-    file = bench.session.folder / CALIBRATION
+    unit, file = cell.unit or _unit_of_lines(bench.port), bench.session.folder / CALIBRATION
     try:
         if cell.calibration is not None:
             return read_calibration(cell.calibration)
@@ -143,6 +140,13 @@ def _find_calibration(bench: CellBench, cell: CellSettings) -> LoadCellCalibrati
     except CalibrationError as problem:
         raise BenchError(str(problem)) from problem
     return _calibrate_now(bench, unit, file)
+
+
+def _unit_of_lines(port: LoadCellPort) -> str:
+    """Return the unit of most lines."""
+    readings = filter(None, map(port.line_format.decode, port.line.recent))
+    ((unit, _),) = Counter(reading.unit for reading in readings if reading.unit).most_common(1) or [(COUNTS, 0)]
+    return unit
 
 
 def _calibrate_now(bench: CellBench, unit: str, file: Path) -> LoadCellCalibration:

@@ -194,12 +194,7 @@ class DaemonRobot:
         """Copy the segments of this program's time, even after the daemon's end."""
         if self._used_s == inf:
             return []
-        try:
-            segments = self._segments()
-        except BenchError:
-            if self._log is None:
-                raise
-            segments = _files_of(self._log)
+        segments = self._segments_at_end()
         try:
             return copy_since(segments, self._used_s, folder)
         except LogError as problem:
@@ -207,6 +202,14 @@ class DaemonRobot:
         except OSError as problem:
             remains = f"it remains in {segments[-1].parent.parent}, copy it from there"
             raise BenchError(f"the daemon's log cannot be copied: {why_not(problem, folder)}; {remains}") from problem
+
+    def _segments_at_end(self) -> list[Path]:
+        try:
+            return self._segments()
+        except BenchError:
+            if self._log is None:
+                raise
+            return _files_of(self._log)
 
     def leave_holding(self) -> None:
         """Release and disconnect; the robot goes on holding its pose. Raises BenchError, CallRefusedError."""

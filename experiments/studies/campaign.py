@@ -117,15 +117,17 @@ def _table(points: list[dict[str, Any]], walks: int) -> Table:
     if len(points) > SHOWN_POINTS:
         shown = sorted(points, key=lambda point: -max(0.0, point["speed_m_s"]))[:SHOWN_POINTS]  # NaN is no speed
         which = f", the fastest {SHOWN_POINTS}"
-    rows = []
-    for point in shown:
-        not_started = [f"{point['not_started']} not started"] * bool(point["not_started"])
-        speeds = {"speed": point["speed_m_s"], "sd": point["speed_sd_m_s"]}
-        rows.append(
-            {key: name_text(value) if isinstance(value, str) else value for key, value in point["values"].items()}
-            | {name: number(100.0 * speed_m_s, 2) for name, speed_m_s in speeds.items()}
-            | {"strides": point["strides"], "stuck": point["stuck_strides"]}
-            | {"faults": ", ".join([*point["faults"], *not_started])}
-        )
     title = f"{counted(walks, 'walk')} at {counted(len(points), 'point')}{which}; all are in {TRIALS}"
-    return Table("points", title, {"speed": "cm/s", "sd": "cm/s"}, DataFrame(rows), "Points")
+    return Table("points", title, {"speed": "cm/s", "sd": "cm/s"}, DataFrame(map(_row, shown)), "Points")
+
+
+def _row(point: dict[str, Any]) -> dict[str, Any]:
+    not_started = [f"{point['not_started']} not started"] * bool(point["not_started"])
+    values = {key: name_text(value) if isinstance(value, str) else value for key, value in point["values"].items()}
+    return values | {
+        "speed": number(100.0 * point["speed_m_s"], 2),
+        "sd": number(100.0 * point["speed_sd_m_s"], 2),
+        "strides": point["strides"],
+        "stuck": point["stuck_strides"],
+        "faults": ", ".join([*point["faults"], *not_started]),
+    }

@@ -126,15 +126,19 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
     parts: list[Table | Figure] = [*result.tables, *result.figures]
     for section in dict.fromkeys([*result.texts, *(part.section for part in parts)]):
         own = [part for part in parts if part.section == section]
-        paragraphs = [f"<p>{escape(text)}</p>" for text in result.texts.get(section, "").split("\n\n") if text]
-        yield from [f"<h2>{escape(section)}</h2>"] * bool(own or paragraphs)
-        yield from paragraphs[:1]  # the others explain what is shown
-        yield from (_table(part) if isinstance(part, Table) else _figure(part, folder) for part in own)
-        yield from paragraphs[1:]
+        yield from _section(section, result.texts.get(section, ""), own, folder)
     yield from ["<h2>Remarks</h2>"] * bool(result.notes)
     yield from (f"<p>{escape(note)}</p>" for note in result.notes)
     logs = f"Logs: {', '.join(escape(log.name) for log in result.logs)}." if result.logs else ""
     yield f"<footer>Numbers: {result.files.summary}. {logs}</footer>\n</body></html>"
+
+
+def _section(section: str, text: str, parts: Sequence[Table | Figure], folder: Path) -> Iterator[str]:
+    paragraphs = [f"<p>{escape(each)}</p>" for each in text.split("\n\n") if each]
+    yield from [f"<h2>{escape(section)}</h2>"] * bool(parts or paragraphs)
+    yield from paragraphs[:1]  # the others explain what is shown
+    yield from (_table(part) if isinstance(part, Table) else _figure(part, folder) for part in parts)
+    yield from paragraphs[1:]
 
 
 def _table(table: Table) -> str:

@@ -46,14 +46,7 @@ def draw_trackway(report: Summary) -> Figure:
 
 def _draw_walks(panel: Axes, report: Summary, looks: Looks, key: str) -> None:
     """Draw the first walk of each gait on its muds."""
-    lengths_cm = report["settings"]["mud_length_cm"]
-    for shade, (mud, length_cm), end_cm in zip(
-        cycle(MUD_SHADES), lengths_cm.items(), accumulate(lengths_cm.values()), strict=False
-    ):
-        panel.axvspan(end_cm - length_cm, end_cm, color=shade, zorder=0)
-        middle, across = (end_cm - length_cm / 2.0, 0.97), panel.get_xaxis_transform()
-        panel.text(*middle, mud_label(mud), transform=across, ha="center", va="top", color=TEXT)
-    panel.set_xlim(0.0, end_cm)
+    _draw_muds(panel, report["settings"]["mud_length_cm"])
     for gait, look in looks.items():
         for strides in report["walks"][gait][:1]:  # none where every trial was left out
             walk = DataFrame(strides, columns=["position_cm", key, "failure"])
@@ -61,6 +54,15 @@ def _draw_walks(panel: Axes, report: Summary, looks: Looks, key: str) -> None:
             for failure, mark in MARKS.items():
                 failed = walk[walk["failure"] == failure]
                 panel.plot(failed["position_cm"], failed[key], mark, color=look["color"], **DOT)
+
+
+def _draw_muds(panel: Axes, lengths_cm: Mapping[str, float]) -> None:
+    ends_cm = accumulate(lengths_cm.values())
+    for shade, (mud, length_cm), end_cm in zip(cycle(MUD_SHADES), lengths_cm.items(), ends_cm, strict=False):
+        panel.axvspan(end_cm - length_cm, end_cm, color=shade, zorder=0)
+        middle, across = (end_cm - length_cm / 2.0, 0.97), panel.get_xaxis_transform()
+        panel.text(*middle, mud_label(mud), transform=across, ha="center", va="top", color=TEXT)
+    panel.set_xlim(0.0, end_cm)
 
 
 def _draw_speeds(panel: Axes, report: Summary, looks: Looks) -> None:

@@ -12,6 +12,8 @@ from functools import partial
 from math import ceil
 from typing import Any
 
+from pandas import DataFrame
+
 from control.records import COEFFICIENTS
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths
 from experiments.robot.bench_robot import (
@@ -34,6 +36,7 @@ from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, c
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.stride_profile import WALK_PERIOD, profile_lists, profile_of, slip_m, thinned, walk_profile
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED, k_s_of
+from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import Log
 
 MUDS: Muds = tuple((name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
@@ -182,13 +185,21 @@ def _entry(bench: Bench, plan: WalkTrials, trial: PlannedTrial, log: Log, closed
     strides = strides_by_method(fetch_strides(robot, closed), log, configuration, plan.flipper, METHODS)
     require_mud(strides[configured_method(configuration.estimation)], plan.flipper)
     profiles = [profile_of(log, plan.flipper, stride["t_start_s"]) for stride in strides[DEFAULT]]
-    for method, drag_n in ((KNOWN, 0.0), (KNOWN_COMPENSATED, configuration.adaptation.body_drag_n)):
-        strides[method] = [
-            stride | {"k_p": None, "k_e": None, "k_s": k_s_of(profile, stride, configuration, drag_n)}
-            for stride, profile in zip(strides[DEFAULT], profiles, strict=True)
-        ]
+    strides[KNOWN] = _with_known_surface(strides[DEFAULT], profiles, configuration, 0.0)
+    drag_n = configuration.adaptation.body_drag_n
+    strides[KNOWN_COMPENSATED] = _with_known_surface(strides[DEFAULT], profiles, configuration, drag_n)
     slips_m = [slip_m(profile, configuration.geometry.flipper_length_m) for profile in profiles]
     for own in strides.values():  # the strides of all methods begin at the same times
         for stride, own_slip_m in zip(own, slips_m, strict=True):
             stride["slip_m"] = own_slip_m
     return {"trial": trial.number, "strides": strides, "truths": bench.truths(plan.flipper)}
+
+
+def _with_known_surface(
+    strides: Sequence[Entry], profiles: Sequence[DataFrame], configuration: Configuration, drag_n: float
+) -> list[Entry]:
+    """Return the strides with the k_s that follows from a known surface, and without k_p and k_e."""
+    return [
+        stride | {"k_p": None, "k_e": None, "k_s": k_s_of(profile, stride, configuration, drag_n)}
+        for stride, profile in zip(strides, profiles, strict=True)
+    ]

@@ -13,7 +13,7 @@ from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import group_by_cause
+from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault
 from control.gait.stride_table import crutching_parameters, full_step_m
 from control.modes import Mode, Request
@@ -151,10 +151,7 @@ class OperatorCalls:
         """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""
         present = self._loop.aged_faults
         shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
-        gravest = present
-        if len(present) > FAULTS_PER_ANSWER:
-            ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
-            gravest = ordered[:FAULTS_PER_ANSWER]
+        gravest = _gravest(present, shown)
         faults = {each.fault: _fault_report(*each) for each in gravest}
         lasting = [each for each in gravest if not self._loop.events.is_settling(each.fault)]
         causes, stop = group_by_cause(lasting, self._bus_of), self._loop.events.stop_fault
@@ -360,6 +357,13 @@ def _accepted(refused: str | None) -> str:
     if refused:
         raise RefusedError(refused)
     return "accepted"
+
+
+def _gravest(present: Sequence[AgedFault], shown: Fault | None) -> Sequence[AgedFault]:
+    """Return as many as an answer has room for, the shown one first."""
+    if len(present) <= FAULTS_PER_ANSWER:
+        return present
+    return sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))[:FAULTS_PER_ANSWER]
 
 
 def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:

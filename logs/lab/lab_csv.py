@@ -118,17 +118,19 @@ def _read_phases(path: Path, table: CsvTable) -> Integers:
     phase_from_lowest = np.array([PHASE_OF_STATE[number] for number in sorted(PHASE_OF_STATE)], dtype=np.int64)
     phase = np.full(len(state), Phase.PAUSE, dtype=np.int64)
     phase[known] = phase_from_lowest[state[known].astype(np.int64) - min(PHASE_OF_STATE)]
-    if np.all(known):
-        return phase
+    if not np.all(known):
+        _report_unknown(path, table, known)
+    return phase
+
+
+def _report_unknown(path: Path, table: CsvTable, known: NDArray[np.bool_]) -> None:
     first, count = int(np.argmin(known)), int(np.count_nonzero(~known))
-    text = (
-        f"the state {state[first]:g} is not known; {count} of {len(state)} rows have such a state and count as a pause"
-    )
+    others = f"{count} of {len(known)} rows have such a state and count as a pause"
+    text = f"the state {table.column[STATE][first]:g} is not known; {others}"
     found = Finding(FindingKind.UNKNOWN_STATE, STATE, float(table.column[TIME][first]), int(table.line[first]), text)
-    if count > MOST_UNKNOWN * len(state):
+    if count > MOST_UNKNOWN * len(known):
         raise LogError(f"{path}: {found}")
     table.findings.append(found)
-    return phase
 
 
 def _find_limit_a(current_a: Floats) -> float:
