@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="make claims", description="ARGS='NAME ... --option'")
     parser.add_argument("names", nargs="*", metavar="NAME", help="of a claim (default: all)")
-    parser.add_argument("--quick", action="store_true", help="only those that CI repeats, two minutes in total")
+    parser.add_argument("--quick", action="store_true", help="only those that CI repeats, one minute in total")
     parser.add_argument("--rewrite", action="store_true", help="write what was measured to the results and the pages")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="with the 16 measured logs of the accuracy page")
     return parser.parse_args(arguments)
@@ -78,14 +78,18 @@ def _check(claims: Sequence[Claim], options: argparse.Namespace, root: Path) -> 
         except ValueError as error:
             print(f"{claim.name}: {error}", file=sys.stderr)
             problems += 1
-    if options.rewrite:
-        try:
-            print("".join(f"rewritten: {page}\n" for page in rewrite_pages(load_results(root), root)), end="")
-        except ValueError as error:
-            print(f"no page is rewritten: {error}", file=sys.stderr)
-            problems += 1
+    problems += options.rewrite and not _rewrite(root)
     print(f"{len(claims)} claims in {(time.monotonic() - began) / 60.0:.1f} min, {problems} drifted or not measured")
     return DRIFTED if problems else 0
+
+
+def _rewrite(root: Path) -> bool:
+    try:
+        print("".join(f"rewritten: {page}\n" for page in rewrite_pages(load_results(root), root)), end="")
+    except ValueError as error:
+        print(f"no page is rewritten: {error}", file=sys.stderr)
+        return False
+    return True
 
 
 def _is_true(claim: Claim, options: argparse.Namespace, root: Path) -> bool:
@@ -97,14 +101,18 @@ def _is_true(claim: Claim, options: argparse.Namespace, root: Path) -> bool:
     new = claimed_figures(claim, measured["output"])
     drifts = drifted(claim, old, new)
     for each in drifts if old else []:
-        shown = ", ".join(pages_of(claim.name, each, root)) or "on no page"
-        was, now = old.get(each, "nothing"), new.get(each, "nothing")
-        print(f"  drifted: {each} was {was}, is {now} (tolerance: {tolerance_of(claim, each)}; {shown})")
+        print(f"  drifted: {_drift_text(claim, each, old, new, root)}")
     if options.rewrite:
         _write(claim, measured, new, folder, root)
     elif not old:
         print("  no result yet: --rewrite writes it")
     return options.rewrite or not drifts
+
+
+def _drift_text(claim: Claim, figure: str, old: Mapping[str, Figure], new: Mapping[str, Figure], root: Path) -> str:
+    shown = ", ".join(pages_of(claim.name, figure, root)) or "on no page"
+    was, now = old.get(figure, "nothing"), new.get(figure, "nothing")
+    return f"{figure} was {was}, is {now} (tolerance: {tolerance_of(claim, figure)}; {shown})"
 
 
 def _time_left(claims: Sequence[Claim], number: int, began: float, root: Path) -> str:
