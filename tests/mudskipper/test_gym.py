@@ -26,9 +26,8 @@ def mud(strength_pa: float) -> dict[str, Any]:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("backend", ["direct", "lockstep"])
-def test_gymnasium_s_own_checker_finds_nothing(backend: str) -> None:
-    check_env(gymnasium.make(ENV, render_mode="rgb_array", backend=backend, duration_s=3.0).unwrapped)
+def test_gymnasium_s_own_checker_finds_nothing() -> None:
+    check_env(gymnasium.make(ENV, render_mode="rgb_array", backend="direct", duration_s=2.0).unwrapped)
 
 
 def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> None:
@@ -50,9 +49,8 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
 
 def test_the_same_seed_gives_the_same_walk_and_another_seed_another_ground() -> None:
     def walked(seed: int) -> list[Any]:
-        walk = gymnasium.make(ENV, duration_s=3.0)
-        first, _ = walk.reset(seed=seed)
-        return [first.tolist(), *(walk.step(np.zeros(3, np.float32))[0].tolist() for _ in range(2))]
+        walk = gymnasium.make(ENV, backend="direct", duration_s=1.0)
+        return [walk.reset(seed=seed)[0].tolist(), walk.step(np.zeros(3, np.float32))[0].tolist()]
 
     assert walked(5) == walked(5) != walked(6)
 
@@ -120,7 +118,7 @@ def test_the_robot_s_own_method_walks_where_actions_are_ignored() -> None:
 
 @pytest.mark.parametrize("action", [[0.0, 0.0, np.nan], [0.0, 0.0, 2.0], [0.0, 0.0]])
 def test_an_action_out_of_its_space_is_refused(action: list[float]) -> None:
-    walk = MudWalk(duration_s=3.0)
+    walk = MudWalk(backend="direct")
     with pytest.raises(gymnasium.error.ResetNeeded):
         walk.step(np.zeros(3, np.float32))
     walk.reset(seed=1)

@@ -12,7 +12,7 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.direct import Direct
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -24,7 +24,7 @@ SOFT_M = 0.2
 def walk_into(configuration: Configuration, pascal: float) -> tuple[set[Phase], EventRecorder]:
     """Walk from soft mud until the robot is well inside firm mud of this strength, held there, or out of time."""
     track, seen = Track([(SOFT_M, Clay("soft", 600.0)), (5.0, Clay("firm", pascal))]), {Phase.REST}
-    robot = Lockstep(configuration, track, 1, EventRecorder(), LAB)
+    robot = Direct(configuration, track, 1, EventRecorder(), LAB)
     robot.arm()
     robot.walk(WalkOrder(0.05))
     end_s = robot.now_s + 30.0
