@@ -66,7 +66,7 @@ def simulate(
 
 def _simulate_locally(folder: Path, config: Path | None, ground: peer.Ground, seed: int, named: str) -> int:
     """Simulate the robot of a configuration, or the usual one, on local buses in this folder."""
-    logs = Path("logs").absolute()
+    logs = Path("mudskipper-simulated").absolute()
     text = configuration_text(folder, logs)
     if config:
         text = read_text(config)

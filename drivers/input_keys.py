@@ -14,7 +14,10 @@ class InputKeys:
         """Look for these names on the device. Raises ImportError without evdev, and OSError."""
         import evdev
 
-        self._device = evdev.InputDevice(device)
+        try:
+            self._device = evdev.InputDevice(device)
+        except OSError as problem:
+            raise OSError(problem.errno, f"is no input device ({problem.strerror})", device) from problem
         self.name = f"{self._device.name} ({device})"
         numbers, has = evdev.ecodes.ecodes, self._device.capabilities(absinfo=False)
         keys, axes = (has.get(kind, []) for kind in (evdev.ecodes.EV_KEY, evdev.ecodes.EV_ABS))

@@ -32,7 +32,7 @@ def pull(
     into: Annotated[Path, Option("for the logs", metavar="DIR", parse=folder)] = Path("robot-logs"),
 ) -> Answer:
     source = f"{robot}{ROBOTS_LOGS}" if robot.endswith(":") else robot.rstrip("/")
-    if ":" not in robot and not Path(robot).is_dir():
+    if robot.startswith("-") or (":" not in robot and not Path(robot).is_dir()):  # ssh takes -oKEY for an option
         raise CommandError(f"{robot}: there is no such folder, and a robot's name ends with a colon: '{robot}:'")
     into.mkdir(parents=True, exist_ok=True)
     before = set(log_files(into, DONE, PRESERVED))

@@ -155,6 +155,8 @@ UNREADABLE = [  # and what the message names
     ("log query nonsense .", "nonsense"),
     ("upgrade text.mcap", "text.mcap"),
     ("joy --keyboard", "terminal"),
+    ("joy --device text.mcap", "text.mcap"),
+    ("log pull -- -oProxyCommand=x:", "-oProxyCommand=x:"),
     ("drives find --interface slcan --channel /none", "slcan /none"),
 ]
 READ_CONFIGURATION = ("simulate", "drives find", "replay text.mcap", "mudskipperd --check-config")
