@@ -26,7 +26,7 @@ from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.air import AirSwing
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
-from estimation.strokes.lift import SHEAR_OVER_STROKE, less_deep, lift_uncertainty
+from estimation.strokes.lift import lift_uncertainty
 from estimation.strokes.origin_fit import median
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.shear import Base, Shear, find_shear, shear_samples, sheared_stroke, yield_force_n
@@ -66,7 +66,6 @@ class ClosingStride(NamedTuple):
     extraction: Stroke
     surface: Surface
     k_p: Estimate
-    lift: float  # uncertainty of ln k_p because the insertion may have lifted the body
     deepest_m: float
     is_stuck: bool  # the flipper did not come out
     zero: Zero
@@ -118,7 +117,7 @@ class FlipperEstimator(StrideEstimator):
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
-        self._lift = 0.0  # uncertainty of ln k_p because the insertion may have lifted the body
+        self._lift = 0.0  # that of the stride under way
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         if self._is_taring:
@@ -255,6 +254,7 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Work[Learned]:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
+        self.lift = self._lift
         if self._direction < 0.0 and stance.batches and stance.batches[0].travel_m < stance.batches[-1].travel_m:
             stance.mirror()
         if not self._met_mud(stance.batches, extraction.batches):
@@ -267,7 +267,6 @@ class FlipperEstimator(StrideEstimator):
             extraction=extraction,
             surface=self._surface,
             k_p=self._k_p,
-            lift=self._lift,
             deepest_m=self._deepest_m,
             is_stuck=self._stuck and self._is_held,
             zero=self._tare.zero,
@@ -291,9 +290,9 @@ class FlipperEstimator(StrideEstimator):
         )
         outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0
         return Learned(
-            k_p=_widened(_named(less_deep(stride.k_p, stride.lift), surface), outward),
-            k_s=_named(less_deep(self._shear_estimate(shear, stride), SHEAR_OVER_STROKE * stride.lift), surface),
-            k_e=_widened(_named(less_deep(k_e, stride.lift), surface), outward),
+            k_p=_widened(_named(stride.k_p, surface), outward),
+            k_s=_named(self._shear_estimate(shear, stride), surface),
+            k_e=_widened(_named(k_e, surface), outward),
             surface_m=surface.depth_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
             surface_std_error_m=surface.std_error_m,

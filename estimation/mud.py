@@ -33,7 +33,7 @@ from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
 from estimation.strokes.fit_samples import StrideFits
-from estimation.strokes.lift import LIFTING_FRACTION
+from estimation.strokes.lift import LIFTING_FRACTION, as_felt, less_deep, with_lift
 from estimation.strokes.shear import Base
 
 PAPER_DRAG_N = 2.5  # the body's drag on its rail in the paper
@@ -79,6 +79,7 @@ class MudEstimator:
         self._closed: list[Work[StrideEstimate]] = []  # of one flipper, while the other one waits for its exit
         self.map = MudMap()
         self.mud_estimate: MudEstimate = NOTHING_KNOWN
+        self.felt_strides: tuple[StrideEstimate, ...] = ()  # that closed last, by the depth of the joints
 
     def reset(self) -> None:
         """Forget everything; work that is not finished is dropped."""
@@ -127,9 +128,12 @@ class MudEstimator:
         for each in closed:
             found.append((yield from each))
             yield
-        strides = tuple(sorted(found, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper))))
-        self.mud_estimate = self._knowledge.update(strides)
+        raw = sorted(found, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper)))
+        lifts = {flipper.flipper: flipper.lift for flipper in self.flippers}
+        self.felt_strides = tuple([with_lift(stride, lifts[stride.flipper], as_felt) for stride in raw])
+        self.mud_estimate = self._knowledge.update(self.felt_strides)
         yield
+        strides = tuple([with_lift(stride, lifts[stride.flipper], less_deep) for stride in raw])
         self.map.update(body_x_m, strides)
         return strides
 

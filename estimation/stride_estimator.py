@@ -58,6 +58,7 @@ class StrideEstimator(ABC):
         self.flipper = flipper
         self.geometry = geometry
         self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
+        self.lift = 0.0  # uncertainty of ln k_p because the insertion of that stride may have lifted the body
         self._loads = JointLoads(geometry, drive, motion)
         self._clock = StrideClock()
         self._motion = PathMotion()

@@ -163,7 +163,7 @@ class MudLearning:
         strides = yield from closing
         yield
         messages = ["another mud"] if self.estimator.mud_estimate.boundary else []
-        messages += yield from self._choose(controller, order, strides, walked_m)
+        messages += yield from self._choose(controller, order, self.estimator.felt_strides, walked_m)
         self._messages += messages
         depth_m, first = controller.gait.next_depth_m, self.strides_closed
         lowest_v, self._lowest_v = self._lowest_v, [inf] * len(self._lowest_v)

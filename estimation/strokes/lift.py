@@ -14,14 +14,15 @@ same error in k_e, whose force grows alike, and 2.5 times that in k_s, whose for
 distinguish a body that rises from clay whose bearing dominates (m = -0.7): both get the uncertainty.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import erfc, exp, hypot, log, pi, sqrt
 
 from control.computing.bounded_work import Work
 from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate_integrals import cross_coupling, stroke_moment_m4, submerged_plate
-from control.records import Estimate
+from control.records import Estimate, StrideEstimate
 from estimation.strokes.depth_line import SHEAR_LAW, STROKE_LAW
 from estimation.strokes.origin_fit import MIN_BATCHES
 from estimation.strokes.stroke import Batch
@@ -76,10 +77,26 @@ def _excess(exponent: float) -> float:
 
 def less_deep(estimate: Estimate, uncertainty: float) -> Estimate:
     """Add the uncertainty of a body that may have risen. A lower bound stays one, since the plate was less deep."""
-    if uncertainty == 0.0 or not estimate.valid or estimate.at_least:
+    if not estimate.valid or estimate.at_least:
         return estimate
     error = uncertainty * estimate.value
     std_error, repeatability = hypot(estimate.std_error, error), hypot(estimate.repeatability, error)
     valid = std_error <= LARGEST_UNCERTAINTY * estimate.value
     reason = LIFTED if not valid or error > estimate.std_error else estimate.reason
     return estimate._replace(std_error=std_error, repeatability=repeatability, valid=valid, reason=reason)
+
+
+def as_felt(estimate: Estimate, uncertainty: float) -> Estimate:
+    """Add the uncertainty as one that all strides have in common.
+
+    A body that rises does so in every stride: the force at a depth of the joints repeats, and the robot predicts by it.
+    """
+    return estimate._replace(std_error=less_deep(estimate, uncertainty).std_error)
+
+
+def with_lift(stride: StrideEstimate, lift: float, change: Callable[[Estimate, float], Estimate]) -> StrideEstimate:
+    """Change the coefficients of a stride; `lift` is the uncertainty of ln k_p."""
+    if lift == 0.0:
+        return stride
+    k_s = change(stride.k_s, SHEAR_OVER_STROKE * lift)
+    return replace(stride, k_p=change(stride.k_p, lift), k_s=k_s, k_e=change(stride.k_e, lift))
