@@ -149,26 +149,30 @@ class Controller:
         return self.joint_targets if self._mode in HELD and self._follows else None
 
     @property
+    def _held_rad(self) -> JointAngles:
+        return self._pose.map(lambda target: target.angle_rad)
+
+    @property
     def moving(self) -> bool:
         """The joints move to a requested pose."""
         return self._move is not None
 
     def end_move(self) -> None:
-        """Stop a move; the joints hold their present targets."""
-        self._move = None
+        """Stop a move; the joints rest at their present targets."""
+        self.hold_pose(self._held_rad)
 
     def move(self, angles: Sequence[float | None], speed_rad_s: float = inf) -> None:
         """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle.
 
         They never move faster than configured.
         """
-        held = self._pose.map(lambda target: target.angle_rad)
-        there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
+        held_rad = self._held_rad
+        there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held_rad, strict=True)))
         self.follow_path([there], min(speed_rad_s, self.motion.path_speed_rad_s))
 
     def follow_path(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
         """In hold, move smoothly from the held pose through these poses, and hold the last one."""
-        self._move = JointPath(self._pose.map(lambda target: target.angle_rad), way_points, speed_rad_s)
+        self._move = JointPath(self._held_rad, way_points, speed_rad_s)
 
     def hold_pose(self, angles: JointAngles) -> None:
         """In hold, replace the held pose at once."""

@@ -288,6 +288,18 @@ def test_the_hold_time_restarts_with_every_hold_and_every_move_and_stops_in_othe
         controller.move([None, 0.0, None, None])
 
 
+def test_a_move_that_is_stopped_on_its_way_leaves_the_joints_at_rest_where_it_stopped() -> None:
+    controller = weightless(DAMPER)
+    wanted_pose(controller, Mode.HOLD)
+    controller.move([0.5, None, None, None])
+    for _ in range(100):
+        moving_nm = controller.step(PERIOD_S, Mode.HOLD, states_at(POSE))
+    stopped = controller.joint_targets
+    controller.end_move()
+    assert moving_nm[0] > 0.1 and controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) == NO_TORQUE
+    assert stopped and controller.joint_targets and controller.joint_targets[0].angle_rad == stopped[0].angle_rad
+
+
 def stopping_ticks(pose: JointAngles) -> int:
     """Return the ticks of a stop of flippers that no torque moves."""
     controller = weightless()
