@@ -13,7 +13,6 @@ from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
 from control.monitors.encoder_monitor import YIELDING_NM
 from control.records import JOINTS, NEVER_S, Torques
-from drivers.drive_types import type_of
 from drivers.fault_injection.failures import MOST_DELAY_S
 from firmware_host.fault_monitor import IN_MUD
 from simulation.body.plant import END_STOPS_RAD
@@ -63,8 +62,8 @@ class NoTorqueWithoutMode(Promise):
         if self._off_since_s is None:
             return
         off_s = self.mechanics.now_s - self._off_since_s
-        least_nm = self.reach.cogging_nm + ROUNDING_NM
         for index, torque_nm in enumerate(torques_nm):
+            least_nm = self.reach.cogging_nm + ROUNDING_NM + self.reach.half_codes_nm[index]
             if abs(torque_nm) > least_nm and off_s > self.reach.longest_s(index, ON_THE_WAY_TICKS):
                 self.broken.append(f"{JOINTS[index]} has {torque_nm:.3f} N·m in mode {self.loop.mode.name.lower()}")
 
@@ -81,8 +80,6 @@ class LimitedMotors(Promise):
         limits = self.loop.configuration.limits
         self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
         self._least_nm = WEAKEST * self._largest_nm  # less is within the limit for any gain of the motor
-        drive = self.loop.configuration.drive
-        self._codes_nm = [type_of(drive[joint]).gate_table(drive[joint]).torque_step_nm for joint in JOINTS]
         self._torques_nm: Torques | None = None  # one step of the mechanics ago
         drives = self.mechanics.drives
         self._fast_rad_s = [min(limits.velocity_rad_s, each.no_load_rad_s) for each in drives]
@@ -106,12 +103,12 @@ class LimitedMotors(Promise):
         """Check what a motor was commanded: its true torque over the gain of a harmed motor."""
         gain = self.reach.gains[index]
         commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
-        rounding_nm += 0.5 * self._codes_nm[index]  # the drive's own resolution, to which a command is rounded
+        rounding_nm += self.reach.half_codes_nm[index]
         if now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
             braking = commanded_nm * speed_rad_s < 0.0
             if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
                 self.broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
-            self._check_slew(index, commanded_nm, 2.0 * rounding_nm + 0.5 * self._codes_nm[index], now_s)
+            self._check_slew(index, commanded_nm, 2.0 * rounding_nm + self.reach.half_codes_nm[index], now_s)
         if commanded_nm != self._before_nm[index]:
             self._before_nm[index], self._changed_s[index] = commanded_nm, now_s
 

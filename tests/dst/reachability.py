@@ -8,6 +8,7 @@ from __future__ import annotations
 from math import cos, inf, radians
 
 from control.records import JOINTS
+from drivers.drive_types import type_of
 from drivers.fault_injection.failure_table import FailureKind
 from drivers.fault_injection.failures import MOST_DELAY_S
 from simulation.devices.drive import SimulatedDriveParameters
@@ -34,6 +35,8 @@ class Reachability:
         self._missed = robot.loop.missed_ticks
         drive = robot.loop.configuration.drive
         self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
+        # the drives' own resolution, to which a command is rounded, also that of no torque to a drive that others armed
+        self.half_codes_nm = [0.5 * type_of(drive[joint]).gate_table(drive[joint]).torque_step_nm for joint in JOINTS]
         self._lags_s = self._current_lags_s()
         self._hastened_s = [-inf] * len(JOINTS)  # when a motor's current lost its lag
         self.stalled_s = 0.0  # since the start

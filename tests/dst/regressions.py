@@ -324,4 +324,18 @@ REGRESSIONS = (
             for_s=3.749,
         ),
     ),
+    Regression(
+        "no torque, rounded to the code of a drive that another program armed again, was counted as torque",
+        Scenario(
+            seed=8100450,
+            surroundings=Surroundings(seed=0, drive_type="mit:DMH3510"),
+            start="hold",
+            events=(
+                Failure(at_s=0.4, component="right_sweep.master", kind="arming", for_s=0.013),
+                Failure(at_s=0.458, component="right_sweep.master", kind="arming", for_s=0.013),
+                Terminate(at_s=0.458),
+            ),
+            for_s=0.521,
+        ),
+    ),
 )
