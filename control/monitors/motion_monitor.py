@@ -22,6 +22,9 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  joint is probed: its torque is PROBE_NM less in one interval, and again as wanted in the next one.
                  Whatever drives a joint back, hand, weight, body or mud, then moves it faster, or slower again; an
                  encoder that slips goes on at its speed. (One that slips alone is found before: speed_monitor.py.)
+                 A recovery that rocks a joint reverses its torque before an interval ends, and throws the joint off
+                 its stop. Each movement to and fro is an interval there: what remains of its path at the end of its
+                 longer stroke, where the joint is slow, goes against the mean torque.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -30,6 +33,7 @@ obeys. Oscillation and following therefore count only where samples and ticks we
 such a gap is a fault of its own (`drive_quiet`, `loop_lagging`); a simulation in real time continues.
 """
 
+from math import copysign
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -65,6 +69,20 @@ class JointDynamics(NamedTuple):
     stiffness_nm_rad: float = 8.0
 
 
+class Stroke(NamedTuple):
+    """The motion while the torque keeps its sign."""
+
+    duration_s: float = 0.0
+    path_rad: float = 0.0
+    impulse_nm_s: float = 0.0
+
+    def plus(self, duration_s: float, path_rad: float, impulse_nm_s: float) -> "Stroke":
+        return Stroke(self.duration_s + duration_s, self.path_rad + path_rad, self.impulse_nm_s + impulse_nm_s)
+
+
+NO_STROKES = Stroke(), Stroke()
+
+
 def runaway_bound_j(torque_nm: float) -> float:
     """Return the energy that may remain unexplained, of a joint with this torque limit."""
     return max(RUNAWAY_RAD * torque_nm, RUNAWAY_FLOOR_J)
@@ -91,6 +109,7 @@ class MotionMonitor:
         self.driven_back = 0  # intervals in a row
         self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
         self._back_rad_s = 0.0  # in the interval before
+        self._strokes = NO_STROKES  # the last ones of a recovery that rocks: the one before, and the present one
 
     @property
     def probed(self) -> bool:
@@ -136,9 +155,18 @@ class MotionMonitor:
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
         target_step_rad = target_rad - self._target_rad
-        if braked or (-PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED):
-            self._pressing_nm = torque_nm
-            self._end_pressing()
+        reverses = torque_nm * self._pressing_nm < 0.0
+        self._pressing_nm = torque_nm
+        pulls = target_rad != target_rad and not braked
+        if pulls:
+            self._watch_rocking(elapsed_s, step_rad, torque_nm, reverses)
+        else:
+            self._strokes = NO_STROKES
+        rocks = self._strokes[0].duration_s > 0.0 and self._strokes[1].duration_s < DRIVEN_BACK_S
+        weak = -PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED
+        if braked or reverses or weak or rocks:
+            self._pressed_s = self._back_rad = 0.0
+            self.driven_back = self.driven_back if pulls else 0
         else:
             self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
@@ -152,17 +180,8 @@ class MotionMonitor:
         away_rad = self.away_rad + (abs(step_rad) - abs(target_step_rad)) + error_rad  # begins again without a target
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
-    def _end_pressing(self) -> None:
-        self.driven_back = 0
-        self._pressed_s = self._back_rad = 0.0
-
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
-        lasts = torque_nm * self._pressing_nm >= 0.0
-        self._pressing_nm = torque_nm
-        if not lasts:
-            self._end_pressing()
-            return
         back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
         near_limit_nm = self._near_limit_nm - PROBE_NM if self.probed else self._near_limit_nm
         leads = target_back_rad > 0.0 and abs(torque_nm) < near_limit_nm
@@ -170,6 +189,24 @@ class MotionMonitor:
         self._back_rad += back_rad - target_back_rad if leads else back_rad
         if self._pressed_s >= (DRIVEN_BACK_S if self.driven_back < PROBED else PROBE_S):
             self._end_interval()
+
+    def _watch_rocking(self, elapsed_s: float, step_rad: float, torque_nm: float, reverses: bool) -> None:
+        """Count each movement to and fro as an interval, at the end of its longer stroke."""
+        if reverses:
+            before, ended = self._strokes
+            if abs(ended.impulse_nm_s) > abs(before.impulse_nm_s) > 0.0:
+                self._end_rocking(before, ended)
+            self._strokes = ended, Stroke()
+        before, present = self._strokes
+        self._strokes = before, present.plus(elapsed_s, step_rad, torque_nm * elapsed_s)
+
+    def _end_rocking(self, before: Stroke, ended: Stroke) -> None:
+        duration_s, path_rad, impulse_nm_s = ended.plus(*before)
+        if abs(impulse_nm_s) > PRESSING_NM * duration_s:
+            self._pressed_s, self._back_rad = duration_s, -copysign(1.0, impulse_nm_s) * path_rad
+            self._end_interval()
+        else:
+            self.driven_back = 0
 
     def _end_interval(self) -> None:
         """Count an interval. From the probe on the speed must be as before, or the count begins again."""

@@ -309,6 +309,38 @@ def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: f
     assert samples.faults[0].name in ("joint_driven_back", "following_error") and pressed_s < 0.40
 
 
+def rock(slip_rad_s: float, side: float, rock_s: float = 0.1) -> tuple[set[str], float]:
+    """Rock a joint at its stop as a recovery does, for 2 s; return faults, and how long full torque pressed it."""
+    samples, pressed_s, angle_rad, velocity_rad_s, torque_nm = Samples(), 0.0, 0.0, 0.0, 0.0
+    for tick in range(round(2.0 / PERIOD_S)):
+        away = tick * PERIOD_S / rock_s % 1.0 < 0.8
+        wanted_nm = min(max((-1.1 if away else 1.1) - DAMPING_NM_S * velocity_rad_s, -TORQUE_NM), TORQUE_NM)
+        torque_nm = min(max(wanted_nm, torque_nm - 0.4), torque_nm + 0.4)  # the slew rate of a tick
+        for _ in range(STEPS):
+            velocity_rad_s += PERIOD_S / STEPS * torque_nm / DYNAMICS.inertia_kg_m2
+            angle_rad += PERIOD_S / STEPS * velocity_rad_s
+            angle_rad, velocity_rad_s = (angle_rad, velocity_rad_s) if angle_rad > 0.0 else (0.0, 0.0)
+        pressed_s += PERIOD_S if angle_rad == 0.0 and torque_nm < -0.3 else 0.0
+        reported_rad, reported_rad_s = angle_rad + slip_rad_s * tick * PERIOD_S, velocity_rad_s + slip_rad_s
+        if samples.add(side * reported_rad, side * reported_rad_s, None, PERIOD_S, side * torque_nm):
+            break
+    return samples.names, pressed_s
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("rate_rad_s", [0.05, 0.3, 1.0])
+def test_a_joint_that_a_recovery_rocks_at_its_stop_is_found_where_its_encoder_slips(
+    rate_rad_s: float, side: float
+) -> None:
+    names, pressed_s = rock(rate_rad_s, side)
+    assert names == {"joint_driven_back"} and pressed_s < 0.4
+
+
+@pytest.mark.parametrize("rate_rad_s", [0.0, -0.05, -0.5])
+def test_a_joint_that_a_recovery_rocks_and_that_moves_with_its_mean_torque_is_healthy(rate_rad_s: float) -> None:
+    assert rock(rate_rad_s, 1.0)[0] == set()
+
+
 def lowered(now_s: float, angle_rad: float) -> float:
     """The load of a weight that a hand lowers."""
     return -0.6 * min(now_s / 2.0, 1.0)
