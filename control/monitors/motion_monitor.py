@@ -23,8 +23,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  Whatever drives a joint back, hand, weight, body or mud, then moves it faster, or slower again; an
                  encoder that slips goes on at its speed. (One that slips alone is found before: speed_monitor.py.)
                  A recovery that rocks a joint reverses its torque before an interval ends, and throws the joint off
-                 its stop. Each movement to and fro is an interval there: what remains of its path at the end of its
-                 longer stroke, where the joint is slow, goes against the mean torque.
+                 its stop. From one reversal at which the joint is slow to the next is an interval there, in which the
+                 path that remains counts against the mean torque.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -47,6 +47,7 @@ AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
+SLOW_RAD_S = 3.0  # of a joint that is not on its way to or fro, and may slip at 1 rad/s
 NEAR_LIMIT_FRACTION = 0.9  # of the torque limit
 DRIVEN_BACK_S = 0.09
 DRIVEN_BACK_RAD_S = 0.03  # seven steps of a 14-bit encoder in an interval
@@ -67,20 +68,6 @@ class JointDynamics(NamedTuple):
 
     inertia_kg_m2: float = 0.0004
     stiffness_nm_rad: float = 8.0
-
-
-class Stroke(NamedTuple):
-    """The motion while the torque keeps its sign."""
-
-    duration_s: float = 0.0
-    path_rad: float = 0.0
-    impulse_nm_s: float = 0.0
-
-    def plus(self, duration_s: float, path_rad: float, impulse_nm_s: float) -> "Stroke":
-        return Stroke(self.duration_s + duration_s, self.path_rad + path_rad, self.impulse_nm_s + impulse_nm_s)
-
-
-NO_STROKES = Stroke(), Stroke()
 
 
 def runaway_bound_j(torque_nm: float) -> float:
@@ -109,7 +96,8 @@ class MotionMonitor:
         self.driven_back = 0  # intervals in a row
         self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
         self._back_rad_s = 0.0  # in the interval before
-        self._strokes = NO_STROKES  # the last ones of a recovery that rocks: the one before, and the present one
+        self._rock_s = UNKNOWN  # since a recovery's last reversal at which the joint was slow
+        self._rock_rad = self._rock_nm_s = 0.0
 
     @property
     def probed(self) -> bool:
@@ -161,10 +149,9 @@ class MotionMonitor:
         if pulls:
             self._watch_rocking(elapsed_s, step_rad, torque_nm, reverses)
         else:
-            self._strokes = NO_STROKES
-        rocks = self._strokes[0].duration_s > 0.0 and self._strokes[1].duration_s < DRIVEN_BACK_S
+            self._rock_s = UNKNOWN
         weak = -PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED
-        if braked or reverses or weak or rocks:
+        if braked or reverses or weak or self._rock_s < DRIVEN_BACK_S:
             self._pressed_s = self._back_rad = 0.0
             self.driven_back = self.driven_back if pulls else 0
         else:
@@ -191,22 +178,15 @@ class MotionMonitor:
             self._end_interval()
 
     def _watch_rocking(self, elapsed_s: float, step_rad: float, torque_nm: float, reverses: bool) -> None:
-        """Count each movement to and fro as an interval, at the end of its longer stroke."""
-        if reverses:
-            before, ended = self._strokes
-            if abs(ended.impulse_nm_s) > abs(before.impulse_nm_s) > 0.0:
-                self._end_rocking(before, ended)
-            self._strokes = ended, Stroke()
-        before, present = self._strokes
-        self._strokes = before, present.plus(elapsed_s, step_rad, torque_nm * elapsed_s)
-
-    def _end_rocking(self, before: Stroke, ended: Stroke) -> None:
-        duration_s, path_rad, impulse_nm_s = ended.plus(*before)
-        if abs(impulse_nm_s) > PRESSING_NM * duration_s:
-            self._pressed_s, self._back_rad = duration_s, -copysign(1.0, impulse_nm_s) * path_rad
-            self._end_interval()
-        else:
-            self.driven_back = 0
+        """Count as an interval what is between two reversals at which the joint is slow."""
+        if reverses and abs(step_rad) < SLOW_RAD_S * elapsed_s:
+            if abs(self._rock_nm_s) > PRESSING_NM * self._rock_s:  # never at the first reversal
+                self._pressed_s, self._back_rad = self._rock_s, -copysign(1.0, self._rock_nm_s) * self._rock_rad
+                self._end_interval()
+            self._rock_s = self._rock_rad = self._rock_nm_s = 0.0
+        self._rock_s += elapsed_s
+        self._rock_rad += step_rad
+        self._rock_nm_s += torque_nm * elapsed_s
 
     def _end_interval(self) -> None:
         """Count an interval. From the probe on the speed must be as before, or the count begins again."""
