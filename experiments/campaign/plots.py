@@ -12,6 +12,7 @@ from pandas import DataFrame
 
 from experiments.reports.mud_styles import name_decades
 from experiments.reports.style import FAINT, FORWARD
+from experiments.reports.text_tables import value_shown
 
 COLUMNS = 3  # of panels
 WIDTH_IN, PANEL_IN = 10.0, 3.0
@@ -59,5 +60,5 @@ def _draw_key(panel: Axes, key: str, points: Sequence[Mapping[str, Any]]) -> Non
 
 
 def name_text(value: Any) -> str:
-    """Return a word, or the name of a file without its folder."""
-    return str(value).rpartition("/")[2] or "-"
+    """Return a value for people, and a file without its folder."""
+    return value_shown(value).rpartition("/")[2]

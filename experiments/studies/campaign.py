@@ -107,8 +107,8 @@ def _explanation(campaign: Campaign, points: list[dict[str, Any]]) -> str:
     at = ", ".join(f"{key} = {name_text(value)}" for key, value in fastest["values"].items())
     common = ", ".join(f"{key} = {value_shown(value)}" for key, value in leaves(campaign.base))
     return (
-        f"The fastest point has {number(100.0 * fastest['speed_m_s'], 2)} cm/s: {at}. Speeds are means over seeds 1 to "
-        f"{campaign.seeds}.\n\nAll walks have {common or 'the defaults'}."
+        f"The fastest point has {number(100.0 * fastest['speed_m_s'], 2)} cm/s: {at}. Speeds are means over "
+        f"{counted(campaign.seeds, 'seed')}.\n\nAll walks have {common or 'the defaults'}."
     )
 
 
@@ -123,7 +123,7 @@ def _table(points: list[dict[str, Any]], walks: int) -> Table:
 
 def _row(point: dict[str, Any]) -> dict[str, Any]:
     not_started = [f"{point['not_started']} not started"] * bool(point["not_started"])
-    values = {key: name_text(value) if isinstance(value, str) else value for key, value in point["values"].items()}
+    values = {key: name_text(value) for key, value in point["values"].items()}
     return values | {
         "speed": number(100.0 * point["speed_m_s"], 2),
         "sd": number(100.0 * point["speed_sd_m_s"], 2),
