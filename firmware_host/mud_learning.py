@@ -75,8 +75,7 @@ class MudLearning:
             configuration.adaptation.body_mass_kg,
         )
         self._configuration = configuration
-        self._gait = configuration.gait
-        self.adaptation = self._adaptation()
+        self._adapt_to(configuration.gait)
         self.loads: tuple[FlipperLoad, ...] = tuple(NO_LOAD for _ in configuration.rig.flippers)
         self.units_per_tick = UNITS_PER_TICK
         self.strides: list[ClosedStride] = []
@@ -91,10 +90,12 @@ class MudLearning:
         self._rig = configuration.rig
         self._lowest_v = [inf] * len(configuration.rig.joints)  # since the last stride closed
 
-    def _adaptation(self) -> Adaptation:
-        configuration = self._configuration
+    def _adapt_to(self, gait: GaitParameters) -> None:
+        """Choose strides of this gait from now on; what the choices share is computed before the first one."""
+        configuration, self._gait = self._configuration, gait
         method = METHODS[configuration.adaptation.method]
-        return method(configuration.adaptation, configuration.geometry, self._gait, configuration.rig)
+        self.adaptation = method(configuration.adaptation, configuration.geometry, gait, configuration.rig)
+        self.estimator.work.add(self.adaptation.prepare())
 
     def reset(self, depth_m: float, gait: GaitParameters | None = None) -> None:
         """Start a new walk with this gait or the configured one; earlier strides stay stored.
@@ -102,10 +103,9 @@ class MudLearning:
         Unfinished work is dropped, so call `finish` before.
         """
         gait = gait or self._configuration.gait
-        if gait != self._gait:
-            self._gait = gait
-            self.adaptation = self._adaptation()
         self.estimator.reset()
+        if gait != self._gait:
+            self._adapt_to(gait)
         self.adaptation.reset(depth_m)
         self.depth_reason = "start"
         self._firm_ticks = 0

@@ -56,6 +56,9 @@ class Adaptation(Protocol):
 
     def reset(self, depth_m: float) -> None: ...
 
+    def prepare(self) -> Work[None]:
+        """Compute what the choices of every walk share; the first choice does it where nothing did it before."""
+
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:
@@ -106,16 +109,14 @@ class DepthAdaptation:
         geometry: FlipperGeometry,
         gait: GaitParameters,
         rig: Rig = TWO_FLIPPERS,
-        candidates: Sequence[Candidate] = (),
     ) -> None:
-        """`candidates`, if given, replace those of the depth grid: narrow before wide and shallow before deep."""
         self.parameters = parameters
         self.geometry = geometry
         self.gait = gait
         self._flippers = len(rig.flippers)
-        depths_m = depth_grid(parameters, geometry, gait)
-        self.candidates = candidates or tuple(make_candidate(geometry, gait, depth_m) for depth_m in depths_m)
-        self._depths_m = sorted({each.depth_m for each in self.candidates})
+        self._pairs = self._gaits_and_depths()
+        self._depths_m = sorted({depth_m for _, depth_m in self._pairs})
+        self.candidates: list[Candidate] = []
         self.forecast = DepthForecast(geometry, gait, parameters.motor_force_n, rig)
         self.reset(parameters.initial_depth_m)
 
@@ -123,10 +124,20 @@ class DepthAdaptation:
         self.choice = DepthChoice(depth_m, False, "start")
         self.forecast.reset()
 
+    def _gaits_and_depths(self) -> Sequence[tuple[GaitParameters, float]]:
+        """Return gait and depth of every candidate, narrow before wide and shallow before deep."""
+        return [(self.gait, depth_m) for depth_m in depth_grid(self.parameters, self.geometry, self.gait)]
+
+    def prepare(self) -> Work[None]:
+        for gait, depth_m in self._pairs[len(self.candidates) :]:
+            self.candidates.append(make_candidate(self.geometry, gait, depth_m))
+            yield
+
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:
         """Choose the next stride; without an estimate of the thrust a deeper one where the body does not advance."""
+        yield from self.prepare()
         self.forecast.update(mud_estimate, strides, walked_m)
         yield
         stuck = any(not stride.released for stride in strides)

@@ -27,7 +27,7 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
-from control.records import TWO_FLIPPERS, Rig, StrideEstimate
+from control.records import StrideEstimate
 
 SWEEP_STEP_DEG = 5.0  # 8 mm of step
 EASY_FRACTION = 0.7  # of the lifting torque: an extraction below it allows a wider sweep
@@ -49,15 +49,13 @@ def sweep_grid(parameters: GaitAdaptationParameters) -> tuple[float, ...]:
     return tuple(low_deg + i * SWEEP_STEP_DEG for i in range(count))
 
 
-def gait_candidates(
+def gaits_and_depths(
     parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters
-) -> tuple[Candidate, ...]:
-    """Return all pairs of depth and sweep within reach, narrow before wide and shallow before deep."""
+) -> list[tuple[GaitParameters, float]]:
+    """Return all pairs of sweep and depth within reach, narrow before wide and shallow before deep."""
     swift = replace(gait, swing_duration_s=parameters.gait.swing_duration_s)
     gaits = [replace(swift, sweep_angle_deg=sweep_deg) for sweep_deg in sweep_grid(parameters.gait)]
-    return tuple(
-        make_candidate(geometry, each, depth_m) for each in gaits for depth_m in depth_grid(parameters, geometry, each)
-    )
+    return [(each, depth_m) for each in gaits for depth_m in depth_grid(parameters, geometry, each)]
 
 
 def covers(stride: Candidate, other: Candidate) -> bool:
@@ -68,21 +66,15 @@ def covers(stride: Candidate, other: Candidate) -> bool:
 class GaitAdaptation(DepthAdaptation):
     """Searches depth and sweep together. Owns the stride under way, and the strides that stuck in this mud."""
 
-    def __init__(
-        self,
-        parameters: AdaptationParameters,
-        geometry: FlipperGeometry,
-        gait: GaitParameters,
-        rig: Rig = TWO_FLIPPERS,
-    ) -> None:
-        super().__init__(parameters, geometry, gait, rig, gait_candidates(parameters, geometry, gait))
-
     def reset(self, depth_m: float) -> None:
         super().reset(depth_m)
         self.choice = self.choice._replace(gait=self.gait)
         self._walked = make_candidate(self.geometry, self.gait, depth_m)
         self._widest_deg = self.parameters.gait.min_sweep_deg
         self._stuck: list[Candidate] = []
+
+    def _gaits_and_depths(self) -> Sequence[tuple[GaitParameters, float]]:
+        return gaits_and_depths(self.parameters, self.geometry, self.gait)
 
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float

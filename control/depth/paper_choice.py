@@ -51,6 +51,9 @@ class PaperAdaptation:
         self._late_m = inf  # depth of the last stride, if a flipper was still in the mud after its extraction
         self._stuck_m = inf  # the shallowest one in this mud whose swing pulled the body back
 
+    def prepare(self) -> Work[None]:
+        return finished(None)
+
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:

@@ -92,14 +92,13 @@ def crutching_parameters(path: GaitPath) -> GaitParameters | None:
 def stride_table(gait: GaitParameters | GaitPath, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
     """Return the rows of one stride at `depth_m` below the nominal surface, in time order."""
     path = crutching(gait) if isinstance(gait, GaitParameters) else gait
-    names = [phase.name for phase in path.phase if phase.name != "pause"]
-    ordered = names == CRUTCHING
+    ordered = [phase.name for phase in path.phase if phase.name != "pause"] == CRUTCHING
     here = position(path.phase[-1].way_points[-1], geometry, depth_m)
     rows = list[PhaseRow]()
     for number, phase in enumerate(path.phase):
-        legs = list(_legs(number, phase, here, geometry, depth_m))
+        legs = list(_legs(number, phase, here, geometry, depth_m, ordered))
         here = legs[-1].sweep_end_rad, legs[-1].depth_end_m
-        rows += [row._replace(phase=_reported(phase.name, row, ordered)) for row in _timed(legs, phase, geometry)]
+        rows += _timed(legs, phase, geometry)
     return tuple(rows)
 
 
@@ -112,17 +111,20 @@ def position(point: WayPoint, geometry: FlipperGeometry, depth_m: float) -> tupl
 
 
 def _legs(
-    number: int, phase: GaitPhase, here: tuple[float, float], geometry: FlipperGeometry, depth_m: float
+    number: int,
+    phase: GaitPhase,
+    here: tuple[float, float],
+    geometry: FlipperGeometry,
+    depth_m: float,
+    ordered: bool,
 ) -> Iterator[PhaseRow]:
     """Yield the parts of a phase's path, with no duration yet; a phase without way-points has one that stays."""
     points = [position(point, geometry, depth_m) for point in phase.way_points] or [here]
     (sweep, depth), peak = here, points.pop(0) if phase.curve == "half_ellipse" else None
     for to_sweep, to_depth in points:
-        row = PhaseRow(Phase.STROKE, 0.0, sweep, to_sweep, depth, to_depth, number)
-        if peak:
-            middle = (sweep + to_sweep) / 2.0, (depth + to_depth) / 2.0
-            row = row._replace(sweep_bulge_rad=peak[0] - middle[0], depth_bulge_m=peak[1] - middle[1])
-        yield row
+        bulge = (peak[0] - (sweep + to_sweep) / 2.0, peak[1] - (depth + to_depth) / 2.0) if peak else (0.0, 0.0)
+        reported = _reported(phase.name, to_sweep - sweep, to_depth - depth, ordered and bulge == (0.0, 0.0))
+        yield PhaseRow(reported, 0.0, sweep, to_sweep, depth, to_depth, number, *bulge)
         sweep, depth = to_sweep, to_depth
 
 
@@ -150,19 +152,17 @@ def length_m(row: PhaseRow, geometry: FlipperGeometry) -> float:
     return fsum(hypot(arm_m * (b[0] - a[0]), b[1] - a[1]) for a, b in zip(points, points[1:], strict=False))
 
 
-def _reported(name: str, row: PhaseRow, ordered: bool) -> Phase:
-    """Return the phase that a row is for the estimator."""
-    phase = Phase[name.upper()]
-    if phase in (Phase.SWING, Phase.PAUSE):
-        return phase
-    curved = row.sweep_bulge_rad or row.depth_bulge_m
-    swept_rad, sunk_m = row.sweep_end_rad - row.sweep_start_rad, row.depth_end_m - row.depth_start_m
-    pure = {
-        Phase.INSERTION: swept_rad == 0.0 and sunk_m > 0.0,
-        Phase.STANCE: swept_rad != 0.0 and sunk_m == 0.0,
-        Phase.EXTRACTION: swept_rad == 0.0 and sunk_m < 0.0,
-    }
-    return phase if ordered and not curved and pure[phase] else Phase.STROKE
+def _reported(name: str, swept_rad: float, sunk_m: float, straight: bool) -> Phase:
+    """Return the phase that a row is for the estimator; only a `straight` one of a crutching gait can be pure."""
+    pure = name in ("swing", "pause") or (
+        straight
+        and (
+            (name == "insertion" and swept_rad == 0.0 and sunk_m > 0.0)
+            or (name == "stance" and swept_rad != 0.0 and sunk_m == 0.0)
+            or (name == "extraction" and swept_rad == 0.0 and sunk_m < 0.0)
+        )
+    )
+    return Phase[name.upper()] if pure else Phase.STROKE
 
 
 def swing_duration_s(gait: GaitParameters | GaitPath, geometry: FlipperGeometry) -> float:

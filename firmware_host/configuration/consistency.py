@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from math import ceil, degrees, floor, radians
 from operator import attrgetter
 
-from control.depth.gait_choice import gait_candidates
+from control.depth.gait_choice import gaits_and_depths
 from control.geometry import FlipperGeometry
 from control.joint_pd import (
     LEAST_MARGIN_RAD,
@@ -232,8 +232,8 @@ def _sweep_problems(configuration: Configuration) -> Iterator[str]:
         yield f"{widest}: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = {adaptation.min_depth_m}"
         return
     poses = [
-        geometry.adduction_rad(radians(each.gait.sweep_angle_deg), each.depth_m)
-        for each in gait_candidates(adaptation, geometry, configuration.gait)
+        geometry.adduction_rad(radians(gait.sweep_angle_deg), depth_m)
+        for gait, depth_m in gaits_and_depths(adaptation, geometry, configuration.gait)
     ]
     lowest_deg = degrees(min(poses))
     if limits.adduction_min_deg > lowest_deg:

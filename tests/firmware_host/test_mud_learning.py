@@ -10,6 +10,7 @@ import pytest
 
 from control.computing.bounded_work import finished
 from control.controller import WalkOrder
+from control.depth.gait_choice import GaitAdaptation
 from control.faults import Fault, FaultKind
 from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, Estimate, FlipperLoad, GaitTarget, Phase, StrideEstimate
@@ -155,6 +156,19 @@ def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> 
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
     reported = [message for _ in range(10) for message in step(learning, controller, loads=(load, load))[1]]
     assert reported == ["insertion ended at 0.0300 m: solid mud"]
+
+
+def test_a_walk_in_another_gait_prepares_its_choices_one_candidate_a_unit(configuration: Configuration) -> None:
+    learning = MudLearning(replace(configuration, adaptation=replace(configuration.adaptation, method="gait")))
+    learning.finish()
+    learning.reset(0.03, GaitParameters(stance_speed_m_s=0.05))
+    adaptation, prepared = learning.adaptation, []
+    assert isinstance(adaptation, GaitAdaptation)
+    while not learning.estimator.work.is_empty:
+        learning.estimator.work.run(1)
+        prepared.append(len(adaptation.candidates))
+    assert prepared[:-1] == list(range(1, len(prepared)))
+    assert {each.gait.stance_speed_m_s for each in adaptation.candidates} == {0.05}
 
 
 # wild coefficients

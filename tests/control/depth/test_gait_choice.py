@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from control.computing.bounded_work import finish
 from control.depth.depth_choice import DepthChoice, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
@@ -239,7 +240,10 @@ def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: i
 
 def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_limit() -> None:
     limit_rad_s = JointLimits().velocity_rad_s
-    for stride in adapted().candidates:
+    adaptation = adapted()
+    finish(adaptation.prepare())
+    assert len(adaptation.candidates) > 40
+    for stride in adaptation.candidates:
         gait = Gait(stride.gait, GEOMETRY)
         gait.reset(stride.depth_m)
         while (target := gait.step(0.002)).stride == 0:
