@@ -6,7 +6,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet
 
 # These tests run a robot in real time, which takes a part of a processor: nothing else runs next to two of them.
-REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/live/test_restarts.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py)
+REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/live/test_restarts.py experiments/calibration/test_weights_daemon.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py)
 
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=1800 -o faulthandler_exit_on_timeout=true

@@ -133,9 +133,14 @@ class Client:
         self._leased = False
 
     def wait_for(self, mode: str, timeout_s: float = 30.0) -> Report:
-        """Return the status once the robot is in a mode such as "hold". Raises TimeoutError; renews the lease."""
+        """Return the status once the robot is in a mode such as "hold"; renew the lease meanwhile.
+
+        Raises TimeoutError, and at once a RuntimeError with the fault's name where a fault took the torque away.
+        """
         deadline_s = time.monotonic() + timeout_s
         while (report := self.status())["mode"] != mode:
+            if report["mode"] == "fault" and report["fault"] and mode != "idle":
+                raise RuntimeError("{name}: {message}".format(**report["fault"]))
             if time.monotonic() > deadline_s:
                 raise TimeoutError(f"the robot is in mode {report['mode']} after {timeout_s:g} s, not in {mode}")
             self.renew()

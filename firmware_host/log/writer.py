@@ -44,14 +44,15 @@ class Reporter:
         self._pipe = pipe
         self._slowest_s: deque[float] = deque(maxlen=RECENT_REPORTS)
         self._due_s = 0.0
-        self._reported_problem = ""
+        self._reported: tuple[Path, str] | None = None
         os.set_blocking(pipe, False)
 
     def update(self, log: LogSegments) -> None:
-        now_s = time.monotonic()
-        if now_s < self._due_s and log.problem == self._reported_problem:
+        """Report once an interval, and at once where the disk refuses or another file begins."""
+        now_s, reported = time.monotonic(), (log.path, log.problem)
+        if now_s < self._due_s and reported == self._reported:
             return
-        self._due_s, self._reported_problem = now_s + REPORT_INTERVAL_S, log.problem
+        self._due_s, self._reported = now_s + REPORT_INTERVAL_S, reported
         self._slowest_s.append(log.slowest_s)
         log.slowest_s = 0.0
         self.send(log)

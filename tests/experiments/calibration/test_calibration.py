@@ -19,7 +19,7 @@ from experiments.actuator.plan import WeighingPlan, steps_of
 from experiments.actuator.report import Readings
 from experiments.actuator.simulation import BuiltRobot
 from experiments.calibration.calibration import calibrate_robot
-from experiments.calibration.robots import CalibratedRobot, running_daemon
+from experiments.calibration.robots import CalibratedRobot
 from experiments.robot.bench_errors import EndedError
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.study.notebook import NotebookError
@@ -27,8 +27,6 @@ from experiments.study.result import Result
 from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from operator_client.status_client import StatusClient
-from tests.running_bench import Bench
 from tests.scripted_operator import ScriptedOperator
 
 JOINT = "right_adduction"
@@ -129,15 +127,3 @@ def test_another_drive_is_no_continuation(case: Case) -> None:
 def test_nothing_moves_without_the_operator_s_consent(case: Case) -> None:
     with pytest.raises(EndedError):
         case.run(ScriptedOperator("", "", "", "n"))
-
-
-def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Path) -> None:
-    own_bench.stop_daemon()
-    configuration = parse_configuration(own_bench.configuration.read_text(encoding="utf-8"))
-    with running_daemon(configuration, tmp_path) as socket:
-        client = StatusClient(socket)
-        assert client.call("status")["robot"] == "simulated"
-        client.close()
-    assert not socket.exists()
-    own_bench.restart_daemon()
-    own_bench.wait_until_ready()

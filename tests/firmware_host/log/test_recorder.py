@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import pytest
@@ -33,6 +34,7 @@ from firmware_host.log.recorder import (
 from firmware_host.log.row_records import pack_record
 from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, TICK, TICK_KIND
 from firmware_host.log.schema import RowKind
+from firmware_host.log.writer import Reporter
 from logs.files.log_reader import read_log
 from tests.waiting import LONGEST_S, wait_until
 
@@ -286,6 +288,19 @@ def test_the_writer_reports_the_disk(recorder: Recorder) -> None:
     os.kill(recorder.writer_pid, signal.SIGKILL)
     wait_until(lambda: not look(recorder).alive)
     recorder.close(LONGEST_S)
+
+
+def test_the_writer_reports_at_once_where_another_file_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firmware_host.log.writer.REPORT_INTERVAL_S", math.inf)
+    reports, pipe = os.pipe()
+    log = SimpleNamespace(path=Path("/1"), problem="", slowest_s=0.0, dropped=0, durable_stamp_s=0.0, repairing=0)
+    reporter = Reporter(pipe)
+    for path in ("/1", "/1", "/2", "/2"):
+        log.path = Path(path)
+        reporter.update(log)  # type: ignore[arg-type]
+    os.close(pipe)
+    with os.fdopen(reports) as lines:
+        assert [json.loads(line)[0] for line in lines] == ["/1", "/2"]
 
 
 def test_a_writer_that_waits_for_its_disk_shows_as_a_slow_write(recorder: Recorder) -> None:
