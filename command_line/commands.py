@@ -45,7 +45,10 @@ COMMANDS: Mapping[str, Command] = {
     "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
     "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
     "gait": (GAIT, "Check and simulate gaits of your own."),
-    "run": ("operation.run.run", "Walk by a control law of your own: a function in a file, called once a stride."),
+    "run": (
+        "operation.run.run",
+        "Move by a control law of your own: a function in a file, once a stride or at a rate.",
+    ),
     "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
     "probe": ("operation.probe.probe", "Find the height of the mud, with its error, by light touches."),
     "stop": ("operation.confirmation.stop", "End the walk, raise the flippers and hold the pose."),

@@ -171,8 +171,12 @@ class Controller:
         self.follow_path([there], min(speed_rad_s, self.motion.path_speed_rad_s))
 
     def follow_path(self, way_points: Sequence[JointAngles], speed_rad_s: float) -> None:
-        """In hold, move smoothly from the held pose through these poses, and hold the last one."""
-        self._move = JointPath(self._held_rad, way_points, speed_rad_s)
+        """In hold, move smoothly from the held pose through these poses, and hold the last one.
+
+        Joints that move already go on without a jump of their velocity.
+        """
+        begun_rad_s = [target.velocity_rad_s for target in self._pose] if self.moving else []
+        self._move = JointPath(self._held_rad, way_points, speed_rad_s, begun_rad_s)
 
     def hold_pose(self, angles: JointAngles) -> None:
         """In hold, replace the held pose at once."""

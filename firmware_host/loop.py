@@ -301,8 +301,7 @@ class Loop:
     def move(self, angles_rad: Mapping[str, float], speed_rad_s: float, now_s: float, by: str) -> None:
         """Move joints slowly to these angles, while the pose is held."""
         path = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
-        self.events.report(now_s, f"move {path} by {by}")
-        self.events.forget_notice()
+        self.events.report_move(now_s, path, by)
         self.controller.move([angles_rad.get(joint) for joint in self.configuration.rig.joints], speed_rad_s)
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:

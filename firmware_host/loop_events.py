@@ -117,6 +117,12 @@ class LoopEvents:
         if message:
             self.report(now_s, message)
 
+    def report_move(self, now_s: float, path: str, by: str) -> None:
+        """Log a move; of a program that sends many, one a second."""
+        if self.requests.update(f"move by {by}", True, now_s):
+            self.report(now_s, f"move {path} by {by}")
+        self.forget_notice()
+
     def report_overruled(self, now_s: float, faults: Iterable[Fault]) -> None:
         for fault in faults:
             self.report(now_s, f"armed by force despite {fault.name}: {fault.message}")

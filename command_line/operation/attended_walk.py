@@ -1,15 +1,17 @@
 """Runs an attended walk: the robot walks for as long as this program renews its lease.
 
 Ctrl-C stops the robot and waits until it holds. If this program dies or hangs for longer than its lease, the daemon
-stops the robot. A control law (run.py) may order each stride.
+stops the robot. A control law (run.py) may order each stride, or move the joints of a robot that holds its pose.
 """
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from command_line import exit_codes
+from command_line.errors import CommandError
 from command_line.json_output import Answer
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, position_text, stride_text
@@ -22,47 +24,71 @@ POLL_S = 0.03  # for strides that have closed, from which a law orders the next 
 MOVING = ("walking", "stopping", "damping")
 
 
-Law = Callable[[StatusClient], None]
+Law = Callable[[StatusClient, dict[str, Any]], None]  # acts on the status
 
 
-class LawError(Exception):
+class LawError(CommandError):
     """A control law cannot go on; the message says why."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, status=exit_codes.REFUSED)
 
 
 def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law | None = None) -> Answer:
     """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
+    return _attend(client, as_json, partial(_renew, client, as_json, law))
+
+
+def attend_pose(client: StatusClient, law: Law, period_s: float) -> Answer:
+    """Let a law move the joints while the robot holds its pose under a lease of this client."""
+    return _attend(client, True, partial(_renew, client, True, law, ("hold",), period_s))
+
+
+def _attend(client: StatusClient, as_json: bool, renew: Callable[[], object]) -> Answer:
+    """Renew the lease to the end, which a law that fails and Ctrl-C bring about, and until the robot is at rest."""
+    status = exit_codes.OK
     try:
-        report, status = _renew(client, as_json, law), exit_codes.OK
+        renew()
     except LawError as problem:
         complain(f"{problem}; the robot stops")
         client.call("stop")
-        report, status = _renew(client, as_json), exit_codes.REFUSED
+        status = exit_codes.REFUSED
     except KeyboardInterrupt:
         client.call("stop")
-        report, status = _renew(client, as_json), exit_codes.INTERRUPTED
+        status = exit_codes.INTERRUPTED
+    report = _renew(client, as_json)
     client.call("release")
     return _conclude(report, status)
 
 
-def _renew(client: StatusClient, as_json: bool, law: Law | None = None) -> dict[str, Any]:
+def _renew(
+    client: StatusClient,
+    as_json: bool,
+    law: Law | None = None,
+    modes: Sequence[str] = MOVING,
+    period_s: float = 0.0,
+) -> dict[str, Any]:
     """Renew the lease until the walk ends, and return the last status. A law that takes too long loses the lease."""
-    line = LiveLine(silent=as_json)
+    line, due_s = LiveLine(silent=as_json), time.monotonic()
+    pause_s = period_s or (POLL_S if law else RENEWAL_S)
     while True:
         report: dict[str, Any] = client.call("status")
-        if report["mode"] not in MOVING:
+        if report["mode"] not in modes:
             line.end()
             return report
         line.show(report)
         try:
             client.call("lease", for_s=LEASE_S)
         except CallRefusedError:
-            if client.call("status")["mode"] in MOVING:
+            if client.call("status")["mode"] in modes:
                 line.end()
                 raise
         if law:
-            law(client)
-        time.sleep(POLL_S if law else RENEWAL_S)
+            law(client, report)
+        now_s = time.monotonic()
+        due_s = max(due_s + pause_s, now_s)
+        time.sleep(due_s - now_s)
 
 
 def _conclude(report: dict[str, Any], status: int) -> Answer:
@@ -71,7 +97,7 @@ def _conclude(report: dict[str, Any], status: int) -> Answer:
     is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
     if not is_sound:
         complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
-        status = exit_codes.REFUSED
+        status = status or exit_codes.REFUSED
     return mode_answer("walk", report["mode"], status=status)
 
 

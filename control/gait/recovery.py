@@ -26,10 +26,9 @@ targets fades out without a jump of position or velocity.
 
 from collections.abc import Sequence
 from math import copysign, cos, fsum, radians, sin
-from typing import NamedTuple
 
 from control.gait.gait import RAMP_S
-from control.gait.joint_path import still
+from control.gait.joint_path import Gap, still
 from control.gait.stride_table import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange, clip
@@ -59,23 +58,6 @@ def lowest_point_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: f
 
 def is_in_mud(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> bool:
     return lowest_point_m(geometry, sweep_rad, adduction_rad) > OUT_M
-
-
-class Gap(NamedTuple):
-    """The difference of two targets, and the time over which it fades."""
-
-    angle_rad: float
-    velocity_rad_s: float
-    duration_s: float
-
-    def after(self, time_s: float) -> JointTarget:
-        """Evaluate e(s) = (1 - s)² (e₀ (1 + 2s) + T e₀' s), s = t/T, which ends at zero with zero velocity."""
-        if time_s >= self.duration_s:
-            return JointTarget(0.0, 0.0)
-        s, run_rad = time_s / self.duration_s, self.velocity_rad_s * self.duration_s
-        angle_rad = (1.0 - s) ** 2 * (self.angle_rad * (1.0 + 2.0 * s) + run_rad * s)
-        rate_rad = (1.0 - s) * (run_rad * (1.0 - 3.0 * s) - 6.0 * self.angle_rad * s)
-        return JointTarget(angle_rad, rate_rad / self.duration_s)
 
 
 class Recovery:

@@ -96,7 +96,7 @@ class OperatorCalls:
             "depth": self._as_holder(self.change_strides),
             "stride": self._as_holder(self.change_strides),
             "move": self._as_holder(self.move),
-            "stop": lambda params, caller: self._request(caller, Request.STOP),
+            "stop": self.stop,
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
             "clear": self.clear,
             "lease": lambda params, caller: self._renew_lease(caller, params["for_s"]),
@@ -320,6 +320,12 @@ class OperatorCalls:
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: str = "") -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
+
+    def stop(self, params: dict[str, Any], caller: Caller) -> str:
+        """End a walk or a move; in hold another program that holds the lease loses it, or it might move on at once."""
+        if self._loop.mode is Mode.HOLD:
+            self._lease.oust(caller)
+        return self._request(caller, Request.STOP)
 
     def clear(self, params: dict[str, Any], caller: Caller) -> str:
         """Clear faults; with `zero`, also accept the angles of joints whose zero may have shifted."""

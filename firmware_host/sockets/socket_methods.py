@@ -329,7 +329,7 @@ METHODS: dict[str, SocketMethod] = {
         (*ANGLES, SPEED, *LEASE),
         refuses_unknown=True,
     ),
-    "stop": SocketMethod(Level.ANYONE, "End a walk or a move; a walk ends with the flippers raised."),
+    "stop": SocketMethod(Level.ANYONE, "End a walk with raised flippers, or a move; in hold also another's lease."),
     "disarm": SocketMethod(Level.ANYONE, "Switch torque off at once."),
     "clear": SocketMethod(
         Level.DRIVE,

@@ -41,12 +41,12 @@ def test_joints_move_under_a_lease(bench: Bench) -> None:
 
 @pytest.mark.parametrize(("wanted", "raised"), [("hold", RuntimeError), ("idle", TimeoutError)])
 def test_a_wait_for_torque_ends_at_once_with_the_fault_that_took_it_away(
-    monkeypatch: pytest.MonkeyPatch, wanted: str, raised: type[Exception]
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, wanted: str, raised: type[Exception]
 ) -> None:
     fault = {"name": "overcurrent", "message": "left_sweep draws 30 A.", "what_to_do": "look"}
     monkeypatch.setattr(mudskipper.Client, "status", lambda _: {"mode": "fault", "fault": fault})
-    with pytest.raises(raised, match="fault|overcurrent"):
-        mudskipper.Client("nowhere").wait_for(wanted, timeout_s=0.0)
+    with mudskipper.Client(bench.socket) as robot, pytest.raises(raised, match="fault|overcurrent"):
+        robot.wait_for(wanted, timeout_s=0.0)
 
 
 def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""A user's control law orders the strides of an attended walk, and a law that fails stops the robot."""
+"""A user's control law orders the strides of an attended walk or moves joints, and one that fails stops the robot."""
 
 from __future__ import annotations
 
@@ -43,6 +43,28 @@ class WalkOfTwoStrides(StatusClient):
 
     def close(self) -> None:
         pass
+
+
+class HoldingRobot(WalkOfTwoStrides):
+    """A daemon whose robot holds its pose until its seventh status, and refuses angles beyond 1 rad."""
+
+    def call(self, method: str, **params: Any) -> Any:
+        if method == "status":
+            self._asked += 1
+            return MODE | {"mode": "hold" if self._asked < 7 else "idle", "now_s": 0.1 * self._asked}
+        if method == "move":
+            if not params["left_sweep_rad"] <= 1.0:
+                raise CallRefusedError("left_sweep: must be at most 1")
+            self.orders.append(params)
+        self._stopped = self._stopped or method == "stop"
+        return "accepted"
+
+
+@pytest.fixture
+def holding(monkeypatch: pytest.MonkeyPatch) -> HoldingRobot:
+    client = HoldingRobot(Path())
+    monkeypatch.setattr("command_line.operation.run.StatusClient", lambda socket: client)
+    return client
 
 
 @pytest.fixture
@@ -101,6 +123,45 @@ def test_an_order_that_the_daemon_refuses_stops_the_robot(
     assert daemon._refusal in capsys.readouterr().err
 
 
+def joint_law(folder: Path, body: str, rate_hz: str = "50.0") -> str:
+    path = folder / "law.py"
+    path.write_text(f"RATE_HZ = {rate_hz}\ndef law(status):\n    {body}\n", encoding="utf-8")
+    return str(path)
+
+
+def test_a_law_with_a_rate_moves_joints_by_the_status_until_the_robot_holds_no_more(
+    holding: HoldingRobot, tmp_path: Path
+) -> None:
+    target = joint_law(tmp_path, "return {'left_sweep_rad': status['now_s']}")
+    assert run.run(target, socket=tmp_path).print(as_json=False) == exit_codes.REFUSED  # it is idle
+    first, *others = holding.orders
+    assert first == {"left_sweep_rad": pytest.approx(0.1), "lease_s": attended_walk.LEASE_S, "take_over": False}
+    assert [order["left_sweep_rad"] for order in others] == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6])
+    assert not holding._stopped
+
+
+@pytest.mark.parametrize(
+    ("bad", "named"),
+    [("1 / 0", "ZeroDivisionError"), ("'up'", "'up'"), ("None", "None"), ("{'left_sweep_rad': float('nan')}", "nan")],
+)
+def test_a_law_of_joints_that_fails_stops_the_robot(
+    holding: HoldingRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str], bad: str, named: str
+) -> None:
+    target = joint_law(tmp_path, f"return {bad} if status['now_s'] > 0.25 else {{'left_sweep_rad': 0.0}}")
+    assert run.run(target, socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
+    assert len(holding.orders) == 2 and holding._stopped
+    assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rate_hz", ["0.0", "51", "float('nan')", "'20'", "None"])
+def test_a_rate_out_of_bounds_is_refused_before_the_robot_moves(tmp_path: Path, rate_hz: str) -> None:
+    with pytest.raises(CommandError, match="RATE_HZ") as refused:
+        run.run(joint_law(tmp_path, "return {}", rate_hz), socket=tmp_path)
+    assert refused.value.status == exit_codes.USAGE
+    with pytest.raises(CommandError, match="--strides"):
+        run.run(joint_law(tmp_path, "return {}"), socket=tmp_path, strides=3)
+
+
 @pytest.mark.parametrize(
     "content", ["", "import nothing_of_this_name", "raise SystemExit(5)", "law = 3", "def other(strides): pass"]
 )
@@ -117,7 +178,8 @@ def test_a_file_without_a_law_is_refused_before_the_robot_walks(tmp_path: Path, 
 def test_the_examples_order_depths_that_the_robot_reaches(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", (LAWS / "paper_rule.py").open())  # a file that is ready, with + and - in it
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 40
-    example = run.load_law(str(path))
+    example, rate_hz = run.load_law(str(path))
+    assert rate_hz == 0.0
     for k_e, step_m in ((3e6, 0.03), (3e5, 0.001), (3e7, 0.0)):
         stride = {"k_e": {"value": k_e, "valid": True}, "step_m": step_m}
         order = run.order_of(example, [stride, stride])

@@ -55,6 +55,21 @@ def test_way_points_are_passed_one_after_the_other() -> None:
     assert all(step[1].angle_rad == 0.0 for step in sweeping)
 
 
+@given(poses, poses, speeds, st.floats(-1.0, 1.0))
+def test_joints_that_move_go_on_without_a_jump_and_still_end_at_rest(
+    start: JointAngles, end: JointAngles, speed: float, fraction: float
+) -> None:
+    begun_rad_s = [fraction * speed] * 4
+    steps = walked(JointPath(start, [end], speed, begun_rad_s))
+    assert steps[-1] == still(end)
+    assert [target.velocity_rad_s for target in steps[0]] == pytest.approx(begun_rad_s, abs=0.2 * speed)
+    for before, after in pairwise(steps):
+        for here, there in zip(before, after, strict=True):
+            assert abs(there.velocity_rad_s) <= 2.0 * speed * (1.0 + 1e-9)
+            mean_rad_s = (here.velocity_rad_s + there.velocity_rad_s) / 2.0
+            assert (there.angle_rad - here.angle_rad) / PERIOD_S == pytest.approx(mean_rad_s, abs=0.2 * speed)
+
+
 def test_a_path_without_points_is_finished_at_once() -> None:
     path = JointPath(Joints(0.1, 0.2, 0.3, 0.4), [], 1.0)
     assert path.finished

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import nan, radians
 from typing import Any
 
@@ -323,6 +324,30 @@ def test_a_stop_ends_a_move(armed: Robot) -> None:
     armed.ask("disarm")
     armed.steps.run_for(0.1)
     assert not armed.ask("status")["moving"]
+
+
+def test_a_stop_of_another_user_ends_the_moves_of_a_program_that_sends_them_at_a_rate(armed: Robot) -> None:
+    armed.ask("move", left_sweep_rad=0.3, lease_s=1.0)
+    armed.steps.run_for(0.1)
+    armed.ask("stop", BEN)
+    with pytest.raises(RefusedError, match=r"^taken over: uid 1001 \(process 78\)"):
+        armed.ask("move", left_sweep_rad=0.3, lease_s=1.0)
+    armed.steps.run_for(1.2)
+    assert (armed.ask("status")["mode"], armed.ask("status")["moving"]) == ("hold", False)
+
+
+def test_moves_at_a_rate_go_on_without_jumps_and_are_logged_once_a_second(armed: Robot) -> None:
+    controller, velocities_rad_s = armed.steps.loop.controller, []
+    for call in range(30):
+        armed.ask("move", left_sweep_rad=0.02 * call)
+        for _ in range(19):
+            armed.steps.step()
+            assert controller.joint_targets is not None
+            velocities_rad_s.append(controller.joint_targets[0].velocity_rad_s)
+    assert max(abs(b - a) for a, b in pairwise(velocities_rad_s)) < 0.1  # of 0.4 rad/s
+    assert min(velocities_rad_s[100:]) > 0.1
+    assert armed.ask("status")["drives"][0]["angle_rad"] == pytest.approx(0.55, abs=0.05)
+    assert len(armed.events.about("move")) == 2
 
 
 def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed: Robot) -> None:
