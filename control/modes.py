@@ -170,7 +170,7 @@ class Refusal(NamedTuple):
         """Return why the robot refuses the request, and what to do."""
         if self.faults:
             waits = ", 'arm --wait' waits for what ends by itself" if self.request is Request.ARM else ""
-            return f"{' '.join(fault.message for fault in self.faults)} 'mudskipper check' says what to do{waits}"
+            return f"{' '.join(fault.message for fault in self.faults)} 'mudskipper check' says what to do{waits}."
         if self.request is Request.CLEAR and self.mode is Mode.HOLD:
             return "nothing to clear: the robot holds its pose; 'mudskipper walk' goes on"
         return IN_MODE[self.mode]
