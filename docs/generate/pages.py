@@ -22,6 +22,7 @@ from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, Sock
 
 EXAMPLE = Path(__file__).parents[2] / "systemd" / "mudskipper.toml"
 SECTION = re.compile(r"^(?=\[)", re.MULTILINE)
+COMMENTED = re.compile(r"^# (?=\[|\w+ =)", re.MULTILINE)  # sections and keys
 COMMENTS_OF_NEXT = re.compile(r"(\n(#.*)?)*\Z")
 TOML_VALUES = (bool, int, float, str, tuple)
 RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
@@ -50,11 +51,12 @@ def gaits() -> Iterator[str]:
 
 
 def example(section: str, keys: Sequence[Key]) -> str:
-    """Return a section to copy: that of the example configuration, or one with every default."""
+    """Return a section to copy: of the example configuration, where it may be a comment, or one with every default."""
     begin = f"[{section}".replace("NAME", "") if section.endswith(".NAME") else f"[{section}]"
-    given = [part for part in SECTION.split(EXAMPLE.read_text(encoding="utf-8")) if part.startswith(begin)]
-    if given:
-        return COMMENTS_OF_NEXT.sub("", given[0]).strip()
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for part in (*SECTION.split(text), *SECTION.split(COMMENTED.sub("", text))):
+        if part.startswith(begin):
+            return COMMENTS_OF_NEXT.sub("", part).strip()
     known = [key for key in keys if key.default is not MISSING and isinstance(key.default, TOML_VALUES)]
     head = f"[{section}]".replace("NAME", "left_sweep")
     return "\n".join([head, *(f"{key.name} = {toml_value(key.default)}" for key in known)])
