@@ -88,8 +88,8 @@ clean:  ## remove the environment and everything that was built
 	@touch $@
 
 .venv/test: pyproject.toml requirements/development.txt
-	@echo "Installing exactly what requirements/development.txt names into .venv (about three minutes) ..."
+	@echo "Installing exactly what requirements/development.txt names into .venv (a minute or two) ..."
 	@$(PYTHON) -m venv .venv
-	@$(PIP) --require-hashes --only-binary=:all: --requirement requirements/development.txt
+	@$(PIP) --no-deps --no-compile --require-hashes --only-binary=:all: --requirement requirements/development.txt
 	@$(PIP) --no-deps --no-index --no-build-isolation --editable .
 	@touch .venv/setup $@

@@ -47,7 +47,8 @@ def walk_demo(wheel: Path) -> None:
     environment = FOLDER / "environment"
     _run(sys.executable, "-m", "venv", environment)
     python = environment / "bin" / "python"
-    _run(python, *PIP, "install", "--require-hashes", "--only-binary=:all:", "-r", ROOT / "requirements" / "robot.txt")
+    locked = ("--require-hashes", "--only-binary=:all:", "-r", ROOT / "requirements" / "robot.txt")
+    _run(python, *PIP, "install", "--no-deps", "--no-compile", *locked)
     _run(python, *PIP, "install", "--no-deps", "--no-index", wheel)
     _run(python, *PIP, "check")
     with tempfile.TemporaryDirectory(prefix="mud-") as folder:
