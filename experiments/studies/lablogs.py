@@ -81,6 +81,7 @@ def study(
         figures=[
             Figure(draw.__name__.removeprefix("draw_"), caption, partial(draw, estimates), "Figures")
             for draw, caption in FIGURES.items()
+            if measured
         ],
         summary=summary,
         title="Estimates from real logs",

@@ -113,7 +113,8 @@ def _draw(figure: Figure, folder: Path) -> list[Path]:
         for path in paths:
             with whole_file(path) as hidden:
                 drawing.savefig(hidden)
-            drawing.set_layout_engine("none")  # its parts stay where they are
+            with rc_context({"figure.constrained_layout.use": False}):
+                drawing.set_layout_engine()  # none: its parts stay where they are, and no draw has to find them
     return paths
 
 
