@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,14 +32,17 @@ def watch(
     with StatusClient(socket) as client:
         flippers = list(client.call("status")["loads"])
     if _can_show_screen(lines):
-        from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
-
-        period_s = period or SCREEN_PERIOD_S
-        app = WatchApp(Feed(Path(socket), period_s), flippers, period_s, partial(send_order, socket))
-        return app.run(mouse=False) or exit_codes.OK
+        return _show_screen(socket, flippers, period or SCREEN_PERIOD_S)
     period_s = period or LINES_PERIOD_S
     print_lines(Feed(Path(socket), period_s), period_s)
     return exit_codes.OK
+
+
+def _show_screen(socket: str | os.PathLike[str], flippers: Sequence[str], period_s: float) -> int:
+    from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
+
+    app = WatchApp(Feed(Path(socket), period_s), flippers, period_s, partial(send_order, socket))
+    return app.run(mouse=False) or exit_codes.OK
 
 
 def _can_show_screen(lines: bool) -> bool:

@@ -7,7 +7,7 @@ not let go while a disk or a terminal stalls, so they use a daemon, which this p
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +29,7 @@ from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from operator_client.status_client import NoDaemonError, StatusClient
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
 from simulation.harness.local_setup import named_folder
 
@@ -52,12 +53,7 @@ class CalibratedRobot:
         if self.built is None:
             rig, hand = HardwareRig(configuration), Hand()
         else:
-            built, constant_nm_a = self.built
-            drives = {
-                joint: replace(drive, torque_constant_error=constant_nm_a / drive.torque_constant_nm_a - 1.0)
-                for joint, drive in on_blocks(built).drives(built).items()
-            }
-            rig = SimulatedRig(configuration, built, drives, self.seed)
+            rig = SimulatedRig(configuration, self.built.configuration, _drives_of(self.built), self.seed)
             hand = SimulatedHand(rig)
         with TestRig(rig, BenchOperator(self.session.operator, hand)) as test_rig:
             for warning in rig.warnings:
@@ -103,6 +99,14 @@ def _wait_for(daemon: subprocess.Popen[bytes], socket: Path, messages: Path) -> 
         time.sleep(POLL_S)
     reported = messages.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["it reports nothing"]
     raise BenchError(f"the daemon that holds the weights did not start: {reported[-1]}")
+
+
+def _drives_of(built: BuiltRobot) -> Mapping[str, SimulatedDriveParameters]:
+    """Return the simulated drives on blocks, with the motors' own torque constant."""
+    return {
+        joint: replace(drive, torque_constant_error=built.constant_nm_a / drive.torque_constant_nm_a - 1.0)
+        for joint, drive in on_blocks(built.configuration).drives(built.configuration).items()
+    }
 
 
 def build_with_errors(configuration: Configuration, seed: int) -> BuiltRobot:

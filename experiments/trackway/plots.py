@@ -1,6 +1,6 @@
 """The walks as a picture: along the trackway as in the paper's figure 8, and Table I as bars and dots."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import accumulate, cycle
 from math import nan
 from typing import Any
@@ -75,11 +75,15 @@ def _draw_speeds(panel: Axes, report: Summary, looks: Looks) -> None:
         panel.bar(places, means, 0.92 * width, yerr=sds, color="0.85", edgecolor="0.6", ecolor="0.5", capsize=3)
         means, sds = np.array([(cell["mean"], cell["sd"] or 0.0) for cell in ours], dtype=float).T
         panel.errorbar(places, means, sds, fmt=look["marker"], color=look["color"], capsize=3, **DOT)
-    best = [each["mean"] for each in report.get("best_constant_depth", {}).values()]
-    if best:
-        ends = np.arange(len(best)) - 0.42, np.arange(len(best)) + 0.42
-        panel.hlines(best, *ends, color=TEXT, linewidth=1.0, linestyle=":", label="best constant depth")
-        panel.legend(loc="upper right")
+    if best := [each["mean"] for each in report.get("best_constant_depth", {}).values()]:
+        _draw_best(panel, best)
     panel.set_xticks(range(len(muds)), [mud_label(mud) for mud in muds])
     panel.set_ylim(0.0, max(panel.get_ylim()[1], 9.0))
     panel.set(ylabel="speed (cm/s)", title="Table I: the paper's (grey bars), ours (dots), ± sd")
+
+
+def _draw_best(panel: Axes, speeds: Sequence[float]) -> None:
+    middles = np.arange(len(speeds))
+    look: dict[str, Any] = {"color": TEXT, "linewidth": 1.0, "linestyle": ":"}
+    panel.hlines(speeds, middles - 0.42, middles + 0.42, label="best constant depth", **look)
+    panel.legend(loc="upper right")

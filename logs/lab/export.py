@@ -2,7 +2,7 @@
 
 import math
 import tomllib
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,9 @@ def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> None:
 
     Raises LogError.
     """
-    try:
-        gait = tomllib.loads(log.configuration_text).get("gait", {})
-    except tomllib.TOMLDecodeError as error:
-        raise LogError(f"the configuration in the log is not TOML: {error}") from None
     depth_m, has_position = _read_ahead(log)
     settings = {"scenario": "mudskipper"} | ({} if depth_m is None else {"insertion_angle": f"{depth_m:.9g}"})
-    settings |= {name: str(value) for name, value in gait.items() if isinstance(value, int | float)}
+    settings |= {name: str(value) for name, value in _gait_of(log).items() if isinstance(value, int | float)}
     out.write(f"{','.join(settings)}\n{','.join(settings.values())}\n")
     start_s = log.ends["stamp_s"][:1]
     names = list(_columns(log.ends[:0], log.rig, start_s, has_position))
@@ -42,6 +38,14 @@ def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> None:
     for ticks in watched_blocks(log, watch, "rows written"):
         columns = _columns(ticks, log.rig, start_s, has_position)
         np.savetxt(out, np.column_stack([*columns.values()]), fmt=formats, delimiter=",")
+
+
+def _gait_of(log: AnyLog) -> dict[str, Any]:
+    try:
+        gait: dict[str, Any] = tomllib.loads(log.configuration_text).get("gait", {})
+    except tomllib.TOMLDecodeError as error:
+        raise LogError(f"the configuration in the log is not TOML: {error}") from None
+    return gait
 
 
 def _read_ahead(log: AnyLog) -> tuple[float | None, bool]:
