@@ -25,13 +25,17 @@ adductions = st.floats(-pi / 2, pi / 2)
 
 def rotated_edge(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> NDArray[np.float64]:
     """Return the arm as a vector, turned about the flipper's own axis and then about the body's fore-aft axis."""
+    arm = np.array([0.0, geometry.flipper_length_m, -geometry.drop_m])
+    edge: NDArray[np.float64] = rotation(sweep_rad, adduction_rad) @ arm
+    return edge
+
+
+def rotation(sweep_rad: float, adduction_rad: float) -> NDArray[np.float64]:
     ca, sa, cb, sb = np.cos(sweep_rad), np.sin(sweep_rad), np.cos(adduction_rad), np.sin(adduction_rad)
     sweep_about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])  # forward positive: clockwise from above
     adduction_about_x = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])
-    edge: NDArray[np.float64] = (
-        adduction_about_x @ sweep_about_z @ np.array([0.0, geometry.flipper_length_m, -geometry.drop_m])
-    )
-    return edge
+    turned: NDArray[np.float64] = adduction_about_x @ sweep_about_z
+    return turned
 
 
 @given(geometries, sweeps, adductions)

@@ -25,6 +25,7 @@ from control.plate_integrals import (
     submerged_part,
     submerged_plate,
 )
+from tests.control.test_geometry import rotation
 
 AUTHORS = FlipperGeometry()
 Array = NDArray[np.float64]
@@ -87,11 +88,7 @@ TOP_CORNER_DRY = Pose(AUTHORS, 0.3, AWRY, 0.8)
 
 def attitude(pose: Pose) -> tuple[float, float, float]:
     """Return the depth of the edge's middle and its change outward and upward, by rotation matrices."""
-    g, ca, sa = pose.geometry, cos(pose.sweep_rad), sin(pose.sweep_rad)
-    cb, sb = cos(pose.adduction_rad), sin(pose.adduction_rad)
-    sweep_about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
-    adduction_about_x = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])
-    up = (adduction_about_x @ sweep_about_z)[2]
+    g, up = pose.geometry, rotation(pose.sweep_rad, pose.adduction_rad)[2]
     depth_m = -up @ [0.0, g.flipper_length_m, -g.drop_m] - g.axis_height_m - pose.surface_m
     return float(depth_m), float(-up[1]), float(up[2])
 

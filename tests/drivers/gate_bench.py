@@ -51,88 +51,88 @@ class Protocol(NamedTuple):
 
 
 def odrive(node: int = NODE) -> Protocol:
-    first = node << 5
     drive = OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0)
     return Protocol(
         table=odrive_table.gate_table(drive),
         torque=lambda torque_nm: pack("<f", torque_nm),
-        always=[
-            *_always_of_odrive(first),
-            Frame(first | 0x18, b"\0"),
-            Frame(first | 0x04, bytes.fromhex("00 c8 01 00")),
-            Frame(first | 0x06, is_remote=True),
-        ],
-        while_open=[Frame(first | 0x07, CLOSED_LOOP)],
-        never=[
-            *_never_of_odrive(first),
-            Frame(first | 0x18, b"\1"),
-            Frame(first | 0x18),
-            Frame(first | 0x04, bytes.fromhex("01 c8 01 00")),  # writes
-            Frame(first | 0x04, bytes.fromhex("00 c8 01 01")),
-            Frame(first | 0x04, bytes.fromhex("00 c8 01")),
-            Frame(first | 0x04, bytes.fromhex("00 c8 01 00 00")),
-            Frame(first | 0x04, is_remote=True),
-            Frame(first | 0x09, is_remote=True),
-        ],
+        always=frames(node, *ALWAYS_OF_ODRIVE, "18#00", "04#00c80100", "06#R"),
+        while_open=frames(node, "07#08000000"),
+        never=frames(
+            node,
+            *NEVER_OF_ODRIVE,
+            "18#01",
+            "18#",
+            "04#01c80100",  # writes
+            "04#00c80101",
+            "04#00c801",
+            "04#00c8010000",
+            "04#R",
+            "09#R",
+        ),
         no_torque=[b"", bytes(3), bytes(5), bytes(8)],
     )
 
 
 def odrive05(node: int = NODE) -> Protocol:
-    first = node << 5
     drive = Odrive05Parameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0)
     return odrive(node)._replace(
         table=odrive05_table.gate_table(drive),
-        always=[*_always_of_odrive(first), Frame(first | 0x18), Frame(first | 0x0A, is_remote=True)],
-        never=[
-            *_never_of_odrive(first),
-            Frame(first | 0x18, b"\0"),  # as firmware 0.6 is asked
-            Frame(first | 0x06, is_remote=True),  # 0.6 is asked for its serial number so; 0.5 would take a new node id
-            Frame(first | 0x06, bytes.fromhex("03000000")),
-            Frame(first | 0x04, bytes.fromhex("00 c8 01 00")),  # 0.6 is asked for a parameter so
-            Frame(first | 0x16, is_remote=True),  # reboots as well
-            Frame(first | 0x0A),  # a request as well, but not of this program's form
-            Frame(first | 0x03, is_remote=True),
-            Frame(first | 0x10),  # calibration of cogging
-        ],
+        always=frames(node, *ALWAYS_OF_ODRIVE, "18#", "0a#R"),
+        never=frames(
+            node,
+            *NEVER_OF_ODRIVE,
+            "18#00",  # as firmware 0.6 is asked
+            "06#R",  # 0.6 is asked for its serial number so; 0.5 would take a new node id
+            "06#03000000",
+            "04#00c80100",  # 0.6 is asked for a parameter so
+            "16#R",  # reboots as well
+            "0a#",  # a request as well, but not of this program's form
+            "03#R",
+            "10#",  # calibration of cogging
+        ),
     )
 
 
-def _always_of_odrive(first: int) -> list[Frame]:
-    return [
-        Frame(first | 0x07, IDLE),
-        Frame(first | 0x0B, TORQUE_MODE),
-        Frame(first | 0x0F, CONFIGURED),
-        Frame(first | 0x1B, GAINS),
-        Frame(first | 0x0E, ZERO),
-        Frame(first | 0x0E, bytes.fromhex("00000080")),  # minus zero
-        Frame(first | 0x00, is_remote=True),
-    ]
+ALWAYS_OF_ODRIVE = (
+    "07#01000000",  # idle
+    "0b#0100000001000000",  # torque mode
+    "0f#000000410000c040",  # 8 turns/s, 6 A
+    "1b#0000003f00000000",  # 0.5 N·m per turn/s, no integrator
+    "0e#00000000",
+    "0e#00000080",  # minus zero
+    "00#R",
+)
+NEVER_OF_ODRIVE = (
+    "0c#0000000000000000",  # position
+    "0d#0000000000000000",  # velocity
+    "02#",  # emergency stop: not used
+    "16#00",  # reboot
+    "1f#",  # firmware update
+    "19#00000000",  # a new angle
+    "07#03000000",  # calibration
+    "07#01",
+    "07#0100000000",
+    "07#R",
+    "0b#0300000001000000",  # position control
+    "0b#0100000006000000",  # torque ramp
+    "0b#08000000",
+    "0f#010000410000c040",  # the least bit more than 8 turns/s
+    "0f#000000410100c040",
+    "0f#000000410000c04000",
+    "1b#0000003f0000803f",  # an integrator
+    "1b#0000803f00000000",
+    "0e#R",
+    "00#",
+    "00#R00",
+)
 
 
-def _never_of_odrive(first: int) -> list[Frame]:
+def frames(node: int, *texts: str) -> list[Frame]:
+    """Return frames in the notation of cansend, with a command of CANSimple in place of the id."""
+    parts = [text.partition("#") for text in texts]
     return [
-        Frame(first | 0x0C, bytes(8)),  # position
-        Frame(first | 0x0D, bytes(8)),  # velocity
-        Frame(first | 0x02),  # emergency stop: not used
-        Frame(first | 0x16, b"\0"),  # reboot
-        Frame(first | 0x1F),  # firmware update
-        Frame(first | 0x19, bytes(4)),  # a new angle
-        Frame(first | 0x07, b"\3\0\0\0"),  # calibration
-        Frame(first | 0x07, b"\1"),
-        Frame(first | 0x07, IDLE + b"\0"),
-        Frame(first | 0x07, is_remote=True),
-        Frame(first | 0x0B, bytes.fromhex("03000000 01000000")),  # position control
-        Frame(first | 0x0B, bytes.fromhex("01000000 06000000")),  # torque ramp
-        Frame(first | 0x0B, CLOSED_LOOP),
-        Frame(first | 0x0F, bytes.fromhex("01000041 0000c040")),  # the least bit more than 8 turns/s
-        Frame(first | 0x0F, bytes.fromhex("00000041 0100c040")),
-        Frame(first | 0x0F, CONFIGURED + b"\0"),
-        Frame(first | 0x1B, bytes.fromhex("0000003f 0000803f")),  # an integrator
-        Frame(first | 0x1B, bytes.fromhex("0000803f 00000000")),
-        Frame(first | 0x0E, is_remote=True),
-        Frame(first | 0x00),
-        Frame(first | 0x00, b"\0", is_remote=True),
+        Frame(node << 5 | int(command, 16), bytes.fromhex(data.removeprefix("R")), is_remote=data.startswith("R"))
+        for command, _, data in parts
     ]
 
 

@@ -7,27 +7,17 @@ import pytest
 
 from drivers.can.frames import Frame
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, Message, arbitration_id
+from drivers.odrive.codec import AxisState, arbitration_id
 from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.odrive05.device import SimulatedOdrive05, join_boards
 from tests.drivers.bench.simulated_bus import simulated
+from tests.simulation.devices.test_odrive import NODE, ask, report
 
-NODE = 3
 ANSWERED = [
     codec05.HEARTBEAT, codec05.GET_MOTOR_ERROR, codec05.GET_ENCODER_ERROR, codec05.GET_CONTROLLER_ERROR,
     codec05.GET_ENCODER_COUNT, codec.GET_ENCODER_ESTIMATES, codec.GET_IQ, codec.GET_BUS_VOLTAGE_CURRENT,
 ]  # fmt: skip
-
-
-def report(drive: SimulatedOdrive05, message: Message, *values: float, now_s: float = 0.0) -> None:
-    assert drive.receive(Frame(arbitration_id(NODE, message), message.encode(*values)), now_s) == []
-
-
-def ask(drive: SimulatedOdrive05, message: Message, now_s: float = 0.0) -> tuple[float, ...]:
-    (answer,) = drive.receive(Frame(arbitration_id(NODE, message), is_remote=True), now_s)
-    assert answer.arbitration_id == arbitration_id(NODE, message)
-    return message.decode(answer.data)
 
 
 def make_drive(armed: bool = False, **changes: Any) -> SimulatedOdrive05:
