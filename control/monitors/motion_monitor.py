@@ -57,6 +57,7 @@ PROBE_NM = 0.125  # less torque moves a flipper that carries 1 kg by 11 mrad
 PROBE_S = 0.05  # and after it
 STEADY_RAD = 0.002  # within it and a fraction of the path the speed is that of the interval before; more than a
 STEADY_FRACTION = 0.1  # stop of 100 N·m/rad yields to the probe
+ROCKED_FRACTION = 0.5  # of both, in each rocking: mud that creeps shows no load
 LONGEST_GAP_S = 0.03  # between two samples
 PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
 SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
@@ -179,21 +180,22 @@ class MotionMonitor:
 
     def _watch_rocking(self, elapsed_s: float, step_rad: float, torque_nm: float, reverses: bool) -> None:
         """Count as an interval what is between two reversals at which the joint is slow."""
-        if reverses and abs(step_rad) < SLOW_RAD_S * elapsed_s:
+        if reverses and abs(step_rad) < SLOW_RAD_S * elapsed_s and not self._rock_s < PROBE_S:
             if abs(self._rock_nm_s) > PRESSING_NM * self._rock_s:  # never at the first reversal
                 self._pressed_s, self._back_rad = self._rock_s, -copysign(1.0, self._rock_nm_s) * self._rock_rad
-                self._end_interval()
+                self._end_interval(1, ROCKED_FRACTION)
             self._rock_s = self._rock_rad = self._rock_nm_s = 0.0
         self._rock_s += elapsed_s
         self._rock_rad += step_rad
         self._rock_nm_s += torque_nm * elapsed_s
 
-    def _end_interval(self) -> None:
+    def _end_interval(self, steady_from: int = PROBED, tolerance: float = 1.0) -> None:
         """Count an interval. From the probe on the speed must be as before, or the count begins again."""
         counts = self._back_rad > DRIVEN_BACK_RAD_S * self._pressed_s
-        if self.driven_back >= PROBED:
+        if self.driven_back >= steady_from:
             as_before_rad = self._back_rad_s * self._pressed_s
-            counts = abs(self._back_rad - as_before_rad) <= STEADY_RAD + STEADY_FRACTION * as_before_rad
+            most_rad = tolerance * (STEADY_RAD + STEADY_FRACTION * as_before_rad)
+            counts = abs(self._back_rad - as_before_rad) <= most_rad
         self.driven_back = self.driven_back + 1 if counts else 0
         self._back_rad_s = self._back_rad / self._pressed_s
         self._pressed_s = self._back_rad = 0.0

@@ -309,7 +309,7 @@ def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: f
     assert samples.faults[0].name in ("joint_driven_back", "following_error") and pressed_s < 0.40
 
 
-def rock(slip_rad_s: float, side: float, rock_s: float = 0.1) -> tuple[set[str], float]:
+def rock(slip_rad_s: float, side: float, rock_s: float = 0.1, uneven_rad: float = 0.0) -> tuple[set[str], float]:
     """Rock a joint at its stop as a recovery does, for 2 s; return faults, and how long full torque pressed it."""
     samples, pressed_s, angle_rad, velocity_rad_s, torque_nm = Samples(), 0.0, 0.0, 0.0, 0.0
     for tick in range(round(2.0 / PERIOD_S)):
@@ -322,6 +322,7 @@ def rock(slip_rad_s: float, side: float, rock_s: float = 0.1) -> tuple[set[str],
             angle_rad, velocity_rad_s = (angle_rad, velocity_rad_s) if angle_rad > 0.0 else (0.0, 0.0)
         pressed_s += PERIOD_S if angle_rad == 0.0 and torque_nm < -0.3 else 0.0
         reported_rad, reported_rad_s = angle_rad + slip_rad_s * tick * PERIOD_S, velocity_rad_s + slip_rad_s
+        reported_rad += uneven_rad * sin(2.0 * pi * tick * PERIOD_S / 0.37)
         if samples.add(side * reported_rad, side * reported_rad_s, None, PERIOD_S, side * torque_nm):
             break
     return samples.names, pressed_s
@@ -339,6 +340,10 @@ def test_a_joint_that_a_recovery_rocks_at_its_stop_is_found_where_its_encoder_sl
 @pytest.mark.parametrize("rate_rad_s", [0.0, -0.05, -0.5])
 def test_a_joint_that_a_recovery_rocks_and_that_moves_with_its_mean_torque_is_healthy(rate_rad_s: float) -> None:
     assert rock(rate_rad_s, 1.0)[0] == set()
+
+
+def test_a_joint_that_a_recovery_rocks_in_mud_that_creeps_unevenly_against_it_is_healthy() -> None:
+    assert rock(0.05, 1.0, uneven_rad=0.0012)[0] == set()
 
 
 def lowered(now_s: float, angle_rad: float) -> float:
