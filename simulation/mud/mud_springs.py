@@ -180,14 +180,16 @@ class LowerEdge(Springs):
         dt_s, clay, rate, _, twist = step
         fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0
-        for half, (outward_m, depth_m) in enumerate(zip(positions_m, depths_m, strict=True)):
-            suction = DEEP_FACTOR / BEARING_FACTOR * min(depth_m / SUCTION_FADE_M, 1.0)
+        for half in (0, 1):
+            outward_m, depth_m = positions_m[half], depths_m[half]
+            suction = DEEP_FACTOR / BEARING_FACTOR * (depth_m / SUCTION_FADE_M if depth_m < SUCTION_FADE_M else 1.0)
             moved_m = dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
             limit_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.thickness_m * wet_m / 2.0
             fraction, before_n = fractions[half], limits_n[half]
             if limit_n > before_n:
                 fraction *= before_n / limit_n
-            fraction = min(max(fraction - moved_m / self.yield_m, -suction * rate), rate)
+            fraction -= moved_m / self.yield_m
+            fraction = -suction * rate if fraction < -suction * rate else rate if fraction > rate else fraction
             fractions[half], limits_n[half] = fraction, limit_n
             force_n += fraction * limit_n
             moment_nm += fraction * limit_n * outward_m

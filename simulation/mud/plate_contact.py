@@ -18,6 +18,7 @@ At rest loads relax: they fade by up to `relaxation` within half a second, and m
 """
 
 from math import exp
+from operator import add
 
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.ground_contact import GroundContact
@@ -57,10 +58,11 @@ class PanelContact:
         attitude, panel = step.attitude, self.panel
         wet_m, middle_m = panel.wet_part_m(attitude)
         positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
-        inner, outer = (self._step_column(step, half, positions_m[half], wet_m / 2.0) for half in (0, 1))
+        inner = self._step_column(step, 0, positions_m[0], wet_m / 2.0)
+        outer = self._step_column(step, 1, positions_m[1], wet_m / 2.0)
         depths_m = (panel.foot_depth_m(attitude, positions_m[0]), panel.foot_depth_m(attitude, positions_m[1]))
         edge_n, edge_nm = self._edge.step(step, positions_m, depths_m, wet_m)
-        n, r, s, n_u, n_s, r_s, s_u = [a + b for a, b in zip(inner, outer, strict=True)]
+        n, r, s, n_u, n_s, r_s, s_u = map(add, inner, outer)
         return n, r, s + edge_n, n_u, n_s, r_s, s_u + edge_nm
 
     def _step_column(self, step: PlateStep, half: int, outward_m: float, breadth_m: float) -> tuple[float, ...]:
