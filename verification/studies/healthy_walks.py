@@ -3,7 +3,9 @@
 Each walk has its own mud, drawn between soft and firm with random strength along the track, the disturbances of the
 authors' logs or none, direct motors or belts with play, a body that is free or on rails, and adaptive or fixed depths.
 The robot walks, holds, moves joints and walks on, in lockstep. A flipper that the mud holds is no false alarm: those
-faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers.
+faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers. A free body in
+mud of more than 3 kPa may walk for a minute and stay where it is: full torque, 11.5 N of thrust, does not drag its
+belly.
 """
 
 from collections import Counter
