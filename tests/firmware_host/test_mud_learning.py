@@ -73,6 +73,7 @@ def step(
 ) -> tuple[list[Any], list[str]]:
     """Let one tick close these strides, and run all units of the work."""
     learning.loads, learning._closing = loads, finished(strides) if strides else None
+    learning.estimator.felt_strides = strides
     learning.adapt(controller)  # type: ignore[arg-type]
     closed, messages = learning.finish()
     return list(closed), list(messages)
