@@ -117,7 +117,7 @@ class FlipperEstimator(StrideEstimator):
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
-        self._lift = 0.0  # that of the stride under way
+        self._lift = 0.0
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         if self._is_taring:

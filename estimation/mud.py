@@ -63,10 +63,7 @@ class MudEstimator:
         rig: Rig = TWO_FLIPPERS,
         body_mass_kg: float = 0.0,
     ) -> None:
-        """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body.
-
-        `body_mass_kg` counts for a free body, and is 0 where it is unknown.
-        """
+        """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body; 0 kg: unknown."""
         drag_n = body_drag_n / len(rig.flippers)
         lift_n = LIFTING_FRACTION * body_mass_kg * GRAVITY_M_S2 / len(rig.flippers) if parameters.free_body else inf
         self.work = WorkQueue()  # of the ends of insertions

@@ -10,8 +10,7 @@ that mud has that force, and with F ∝ d^(1+m)
     (d/z₀)^(1+m) = (z/z₀)^(1+e)        k(z) / k measured = (z/d)^(1+m) = (z/z₀)^(m-e)
 
 So the uncertainty of ln k_p is ln z/z₀ times the root mean square of max(m - e, 0) over m. The shallower plate has the
-same error in k_e, whose force grows alike, and 2.5 times that in k_s, whose force grows as z^1.5. One stroke cannot
-distinguish a body that rises from clay whose bearing dominates (m = -0.7): both get the uncertainty.
+same error in k_e, whose force grows alike, and 2.5 times that in k_s, whose force grows as z^1.5.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +31,6 @@ from estimation.strokes.withstood import SHALLOWEST_M
 LIFTING_FRACTION = 0.5  # of the weight
 SHEAR_OVER_STROKE = (2.0 + SHEAR_LAW.exponent) / (1.0 + STROKE_LAW.exponent)
 LIFTED = "limited by the body: the insertion's force may have lifted it"
-CONSTANT_FORCE = -1.0  # exponent of F/z
 LEAST_FRACTION = 0.05  # of the largest F/z: less is noise, or a plate that bounced off
 
 
@@ -45,11 +43,11 @@ def lift_uncertainty(
         if number % BATCHES_PER_UNIT == 0:
             yield
         depth_m = batch.travel_m - surface_m
-        if depth_m < SHALLOWEST_M:
-            continue
         plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface_m)
-        torque_nm = batch.adduction_nm - cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
         moment_m4 = stroke_moment_m4(geometry, plate, batch.sweep_rad)
+        if depth_m < SHALLOWEST_M or moment_m4 == 0.0:
+            continue
+        torque_nm = batch.adduction_nm - cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
         arm_m = moment_m4 / (plate.area_m2 * geometry.plate_thickness_m)
         force_n = torque_nm * geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad) / arm_m**2
         if ratios or force_n >= lift_n:
@@ -64,7 +62,7 @@ def _exponent(logs: Sequence[float], ratios: Sequence[float]) -> float:
     mean = exact_sum(logs) / n
     spread = exact_sum([(each - mean) ** 2 for each in logs])
     if n < MIN_BATCHES or not (spread > 0.0 and least > 0.0):
-        return CONSTANT_FORCE
+        return -1.0
     return exact_sum([(u - mean) * log(max(v, least)) for u, v in zip(logs, ratios, strict=True)]) / spread
 
 
@@ -87,10 +85,7 @@ def less_deep(estimate: Estimate, uncertainty: float) -> Estimate:
 
 
 def as_felt(estimate: Estimate, uncertainty: float) -> Estimate:
-    """Add the uncertainty as one that all strides have in common.
-
-    A body that rises does so in every stride: the force at a depth of the joints repeats, and the robot predicts by it.
-    """
+    """Add the uncertainty as one that all strides share: the force at a depth of the joints repeats."""
     return estimate._replace(std_error=less_deep(estimate, uncertainty).std_error)
 
 
