@@ -1,7 +1,5 @@
 """A ground and a gait as values of a program: the tables of their files, checked as the files are."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields

@@ -3,8 +3,6 @@
 Both report a stride with the same keys and units: those of the socket's `strides`, and its advance, time and energy.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack

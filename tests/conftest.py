@@ -1,7 +1,5 @@
 """Fixtures that tests of several layers share."""
 
-from __future__ import annotations
-
 import signal
 import tempfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Copies of a robot in lockstep, so that many tests can start from the same moment of one walk."""
 
-from __future__ import annotations
-
 import copyreg
 from copy import deepcopy
 from struct import Struct

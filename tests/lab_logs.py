@@ -1,7 +1,5 @@
 """Synthetic logs in the authors' form with a known truth, for tests that read such logs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The documented order of modes by how hard they stop the robot, and the mildest mode that each reaction permits."""
 
-from __future__ import annotations
-
 from control.faults import Reaction
 from control.modes import Mode
 

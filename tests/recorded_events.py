@@ -1,7 +1,5 @@
 """A recorder that stores the event texts of a log, for tests of reported events."""
 
-from __future__ import annotations
-
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
 

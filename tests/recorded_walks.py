@@ -1,7 +1,5 @@
 """Logs of simulated walks over the paper's muds, for tests that read logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from control.controller import WalkOrder

@@ -1,7 +1,5 @@
 """A simulated robot and a real daemon as processes in real time, operated through the command line."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

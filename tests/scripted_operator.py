@@ -1,7 +1,5 @@
 """An operator for tests: gives scripted answers, and records questions and messages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 

@@ -1,7 +1,5 @@
 """The links of the documents at the top lead to files, and the generated references are whole and valid."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping

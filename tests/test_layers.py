@@ -1,7 +1,5 @@
 """Imports only point down, between folders and between modules; read from the source with `ast`."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

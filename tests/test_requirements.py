@@ -1,7 +1,5 @@
 """The locked requirements of installations as root, and of CI, fit pyproject.toml, completely and by hashes."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib.metadata import PackageNotFoundError, requires

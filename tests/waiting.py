@@ -1,7 +1,5 @@
 """Waiting for asynchronous actions of another process or of the kernel."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

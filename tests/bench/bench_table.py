@@ -1,7 +1,5 @@
 """The readings of a stage as a text table: a row for each quantity, a column for each joint."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from control.records import JOINTS

@@ -5,8 +5,6 @@ pytest tests/bench --config FILE          the same on the interfaces of the conf
 pytest tests/bench --simulated            a simulated robot, as fast as it computes
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Generator, Iterator
 from datetime import UTC, datetime

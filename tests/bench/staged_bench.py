@@ -1,7 +1,5 @@
 """The parts that the stages of the bench share: the test rig, the measured values, and the report of all stages."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager

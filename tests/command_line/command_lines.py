@@ -1,7 +1,5 @@
 """Runs command lines in this process or in a separate one."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A client of a daemon that answers as a test wants."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`mudskipper experiment flipper` asks no questions and leaves a folder with all results."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

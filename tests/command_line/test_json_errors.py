@@ -1,7 +1,5 @@
 """With --json, every command that fails prints its reason as a JSON object with the same keys."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

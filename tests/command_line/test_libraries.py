@@ -1,7 +1,5 @@
 """Commands load no library that they do without, and name the extra that brings a missing one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`mudskipper plot` and `mudskipper film`: the files, the drawn values and the refused options."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

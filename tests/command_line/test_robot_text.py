@@ -1,7 +1,5 @@
 """A drive that fell silent may have torque, even if it last reported that it was idle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Wrong inputs of every command: no traceback, one exit status for one kind of mistake, a text that names the thing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

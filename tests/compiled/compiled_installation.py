@@ -3,8 +3,6 @@
 `python -m tests.compiled.compiled_installation FOLDER` builds it for other uses, such as the whole suite of tests.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

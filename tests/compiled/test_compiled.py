@@ -1,7 +1,5 @@
 """The compiled form of the program does the same as its sources, to the last digit."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

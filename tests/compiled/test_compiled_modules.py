@@ -1,7 +1,5 @@
 """The list of modules to compile names only modules that may be compiled, and all that have to be."""
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from collections.abc import Iterator

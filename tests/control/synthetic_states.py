@@ -1,7 +1,5 @@
 """States that the drives of joints at rest report."""
 
-from __future__ import annotations
-
 from control.records import DriveState, DriveStates, JointAngles, Torques, same_for_all
 
 NO_TORQUE: Torques = same_for_all(0.0)

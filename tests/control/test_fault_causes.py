@@ -1,7 +1,5 @@
 """Faults of one cause are one group, so that each cause is reported once."""
 
-from __future__ import annotations
-
 from graphlib import TopologicalSorter
 
 import pytest

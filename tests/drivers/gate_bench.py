@@ -1,7 +1,5 @@
 """The transmit gate between a port and a mock bus, and the frames of every protocol for it, byte by byte."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from struct import pack
 from typing import NamedTuple

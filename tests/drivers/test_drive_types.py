@@ -1,7 +1,5 @@
 """Every type of drive lists the arbitration ids that it uses, so that two types on one bus never share one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """What the axes of every type of drive notice, over simulated drives on one bus."""
 
-from __future__ import annotations
-
 from math import isnan
 
 import pytest

@@ -1,7 +1,5 @@
 """The input of the emergency stop: bouncing contacts, inputs that vanish, and what does not open."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from types import SimpleNamespace

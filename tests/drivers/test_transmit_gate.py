@@ -1,7 +1,5 @@
 """Frames that pass the gate to the wires and frames that do not, byte by byte; covers every branch and every mutant."""
 
-from __future__ import annotations
-
 import ast
 import re
 from math import isfinite, nan

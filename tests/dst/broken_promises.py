@@ -3,8 +3,6 @@
 Each one is a patch of the product, applied while the context lasts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, NamedTuple

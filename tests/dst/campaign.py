@@ -9,8 +9,6 @@ Each broken promise is shrunk to a short schedule, which is printed as text and 
 Ctrl-C ends a campaign with what it has found.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -3,8 +3,6 @@
 SHARED consecutive seeds share their surroundings, and with them one sound walk. Everything else is drawn for each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from enum import StrEnum
 from math import exp, log

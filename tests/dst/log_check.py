@@ -3,8 +3,6 @@
 The rows go to files as they do in the log's writer, but in this process.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator, Sequence

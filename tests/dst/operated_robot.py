@@ -4,8 +4,6 @@ After each tick of the loop the socket serves its clients, as in the daemon. The
 that the kernel would report for each is chosen here.
 """
 
-from __future__ import annotations
-
 import socket
 from collections import deque
 from contextlib import AbstractContextManager, ExitStack, redirect_stderr, suppress

@@ -4,8 +4,6 @@ No promise relies on a monitor of the robot, except to check that it is silent w
 after every tick and yields a text for each broken promise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from control.controller import SOFT_STOP_S

@@ -3,8 +3,6 @@
 The bounds of the promises follow from them. This module knows the schedule, not the robot's own state.
 """
 
-from __future__ import annotations
-
 from math import cos, inf, radians
 
 from control.records import JOINTS

@@ -3,8 +3,6 @@
 They are stored as they were printed and not as seeds alone, because a seed draws another schedule when drawing changes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from tests.dst.scenario import Call, Drift, Failure, Scenario, Surroundings, Suspend, Terminate

@@ -1,7 +1,5 @@
 """Runs one scenario: its schedule, then the return to rest, with every promise checked after each tick."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress

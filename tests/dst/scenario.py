@@ -4,8 +4,6 @@ Everything that happens follows from this record, to the last bit. Its `repr` is
 a promise can be pasted into the regression list as it is printed.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from drivers.drive_types import DEFAULT

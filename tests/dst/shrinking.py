@@ -4,8 +4,6 @@ Delta debugging: events are left out in smaller and smaller groups, then duratio
 the surroundings return to the defaults, as long as the promise stays broken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from tests.dst.scenario import LASTING, Event, Scenario, Surroundings, end_s

@@ -4,8 +4,6 @@ Booting, arming and walking into a phase of the gait takes two seconds of simula
 otherwise spend without a failure.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from functools import lru_cache

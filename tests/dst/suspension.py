@@ -4,8 +4,6 @@ The drives and the mechanics go on meanwhile. A tick that was stopped continues 
 values that it has read before, except that the clock has moved on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

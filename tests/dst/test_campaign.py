@@ -1,7 +1,5 @@
 """A campaign draws every kind of event, and finds no broken promise in the regression list."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import get_args
 

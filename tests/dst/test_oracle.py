@@ -1,7 +1,5 @@
 """The oracle notices robots that break a promise, and gives the same result for a seed every time."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.dst.broken_promises import BREAKS

@@ -3,8 +3,6 @@
 `python -m tests.estimation.coefficient_digits` needs no package, so it runs in any interpreter.
 """
 
-from __future__ import annotations
-
 import json
 
 from control.records import BodyPose, Joints

@@ -1,7 +1,5 @@
 """A coefficient has the same digits in every version of Python, so logs replay alike on any computer."""
 
-from __future__ import annotations
-
 import ast
 import json
 import shutil

@@ -1,7 +1,5 @@
 """A flipper that meets two surfaces in one trial reports both; one that meets a single surface reports one."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A robot at rest, for tests: time passes for it, and it records nothing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from firmware_host.configuration.configuration import Configuration

@@ -1,7 +1,5 @@
 """Synthetic logs, estimates and strides with given contents."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

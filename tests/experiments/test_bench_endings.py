@@ -1,7 +1,5 @@
 """At every ending of an experiment the flippers are out of the mud before the torque is off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

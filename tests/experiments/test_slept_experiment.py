@@ -1,7 +1,5 @@
 """An experiment begins only if it is permitted to, and handles a lease that expired while its computer slept."""
 
-from __future__ import annotations
-
 import errno
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Explore everything at once, which takes an hour: `python -m tests.exploration`. The tests explore a part of it."""
 
-from __future__ import annotations
-
 import sys
 
 from tests.exploration.abstract_robot import AbstractRobot

@@ -1,7 +1,5 @@
 """Motion and fault detection without joints: the search decides what they report."""
 
-from __future__ import annotations
-
 from math import inf
 from types import SimpleNamespace
 from typing import Any

@@ -4,8 +4,6 @@ Loop, fault latch, lease, operator calls and the arming sequence are the product
 abstract: drives, motion and fault detection.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from control.faults import Fault

@@ -3,8 +3,6 @@
 A `Memory` is read from the product's objects and restored into them, so this module knows their private fields.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 from typing import Any, NamedTuple
 

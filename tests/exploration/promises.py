@@ -4,8 +4,6 @@ A promise is a text and a condition on one edge of the graph that the search wal
 robot travel along as `Debts`, so that no promise relies on the code that it checks.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from control.controller import DAMPING_S, SOFT_STOP_S

@@ -1,7 +1,5 @@
 """Breadth-first search over every state that the robot can reach; a broken promise comes with a shortest path."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator
 from itertools import chain, combinations, product

@@ -1,7 +1,5 @@
 """Every state that modes, latch, lease and arming can reach keeps every promise; a weakened robot does not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Observes what a loop sends: simulated drives that hear it, and nothing else, must stay without torque."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from random import Random
 

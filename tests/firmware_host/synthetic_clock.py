@@ -1,7 +1,5 @@
 """A clock for tests that must not wait."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 

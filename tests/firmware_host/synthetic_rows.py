@@ -1,7 +1,5 @@
 """Rows of a log with the given fields; the others hold zeros."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND

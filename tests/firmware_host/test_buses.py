@@ -1,7 +1,5 @@
 """Buses that do not open, vanish, or appear later are reported, and the robot stays disarmed."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import os

@@ -1,7 +1,5 @@
 """The daemon ends on request or because of a bug; the drives are idle in both cases."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

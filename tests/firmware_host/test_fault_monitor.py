@@ -1,7 +1,5 @@
 """The fault monitor checks more than single joints: buses, gate, arming, drive health, pose, and trust in encoders."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import nan
 from typing import Any, cast

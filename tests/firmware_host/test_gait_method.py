@@ -1,7 +1,5 @@
 """The adaptation method "gait", from the validation of its configuration to the robot's walk."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

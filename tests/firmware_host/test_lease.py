@@ -1,7 +1,5 @@
 """A lease is lost by silence or disconnection, and stays lost until it is released or reset."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_host.lease import Lease

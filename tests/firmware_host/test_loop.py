@@ -1,7 +1,5 @@
 """The loop on simulated drives: requests, garbage on the bus, missed ticks, and the log."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

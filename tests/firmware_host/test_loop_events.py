@@ -1,7 +1,5 @@
 """The events of the loop: messages in the log, and the notice in the status."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -4,8 +4,6 @@ One robot walks through all phases and is copied in each, so that every failure 
 those of the table; the fault matrix proves that each is reported in time, in every phase.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace

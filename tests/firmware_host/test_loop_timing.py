@@ -1,7 +1,5 @@
 """The timing statistics agree with numpy on the same durations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

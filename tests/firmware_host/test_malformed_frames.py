@@ -5,8 +5,6 @@ frames, or bursts of one frame, as a babbling node sends. Each goes to a robot i
 never come, and to one that is idle, among the true messages of its drives.
 """
 
-from __future__ import annotations
-
 from struct import pack
 
 import pytest

@@ -1,7 +1,5 @@
 """The source of the body's pose: its configuration, opening, and report."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import closing

@@ -1,7 +1,5 @@
 """Every log contains the version and the commit that wrote it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

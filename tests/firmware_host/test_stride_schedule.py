@@ -1,7 +1,5 @@
 """The work at the ends of strides is spread over ticks, and its results do not depend on how it is spread."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """On a synthetic clock, the ticker keeps its absolute deadlines."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.rate import PERIOD_S, RATE_HZ

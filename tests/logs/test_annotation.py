@@ -1,7 +1,5 @@
 """A closed log takes a description without a change of its rows, and everything that reads logs knows it."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Recovery keeps every row of the chunks that end before the first changed byte, i
 complete log.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The faults of a log are read back as the causes that the daemon reported."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

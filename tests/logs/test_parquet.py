@@ -1,7 +1,5 @@
 """A Parquet export has every value of a log's rows, one number or word per cell, with units."""
 
-from __future__ import annotations
-
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager

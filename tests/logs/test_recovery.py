@@ -1,7 +1,5 @@
 """A log whose writer was killed is recovered with every row on the disk, and other programs can open it."""
 
-from __future__ import annotations
-
 import os
 import tracemalloc
 from collections.abc import Iterator

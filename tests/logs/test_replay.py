@@ -1,7 +1,5 @@
 """A replayed log gives the estimates that the robot had while it walked; the authors' logs are read unchanged."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A user's own program operates the simulated robot in real time."""
 
-from __future__ import annotations
-
 import doctest
 from pathlib import Path
 

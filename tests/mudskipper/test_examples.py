@@ -1,7 +1,5 @@
 """The public package and the examples do what their documentation says."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A ground and a gait are checked as their files are, and nothing changes them."""
 
-from __future__ import annotations
-
 import doctest
 import tomllib
 from dataclasses import FrozenInstanceError

@@ -1,7 +1,5 @@
 """Rows of an opened log are numpy arrays that become pandas tables."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -4,8 +4,6 @@ Each mutant replaces its module in a fork of this process, where the module's te
 mutant survives that is not listed as equivalent, or if a listed one is killed or gone (tests/mutants/subjects.py).
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import signal

@@ -5,8 +5,6 @@ min with max; changes a constant; removes `not` or a sign; makes a condition tru
 statement out. Names, annotations and messages are left alone.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Collection, Iterator
 from copy import deepcopy

@@ -1,7 +1,5 @@
 """A subscription survives the absence and the restart of its daemon, and waits only if its caller wants it to."""
 
-from __future__ import annotations
-
 import os
 import socket
 from pathlib import Path

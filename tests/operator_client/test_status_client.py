@@ -1,7 +1,5 @@
 """The client matches answers to requests, and distinguishes a closed connection from an absent daemon."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ The firm mud has 4.5 kPa, which holds flippers from 3.5 cm on. One of 6 kPa can 
 insertion that ended early may need a recovery too.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from control.controller import WalkOrder

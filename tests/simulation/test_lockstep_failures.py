@@ -1,7 +1,5 @@
 """In lockstep injected failures are the same every time, are logged, and are over when the robot is put right."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.controller import WalkOrder

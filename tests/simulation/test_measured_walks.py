@@ -4,8 +4,6 @@ The steps must equal those in the log. The motion in the capture is computed her
 reader finds it at any heading is tested with a known truth in tests/logs/lab/test_body_track.py.
 """
 
-from __future__ import annotations
-
 import gzip
 from contextlib import closing
 from functools import cache

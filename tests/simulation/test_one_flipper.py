@@ -1,7 +1,5 @@
 """A rig with one flipper and two motors runs everything that four motors run: loop, log, replay and viewers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

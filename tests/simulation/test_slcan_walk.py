@@ -3,8 +3,6 @@
 Frames pass as LAWICEL's lines through two pseudo-terminals, pyserial and python-can.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """In muds that hold the flippers the whole program recovers by itself, or stops safely if it cannot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The service files agree with the example configuration and with the code, and systemd accepts them."""
 
-from __future__ import annotations
-
 import grp
 import os
 import shutil

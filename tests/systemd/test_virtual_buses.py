@@ -1,7 +1,5 @@
 """The guide's changes for an installation on virtual CAN buses agree with each other."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

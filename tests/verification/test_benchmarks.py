@@ -4,8 +4,6 @@ No figure of time or memory is asserted: on a shared machine it would fail by it
 time for their figures alone (loop_jitter, viewers_cost) are not run.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The pages show what the results say, and `make claims` notices drift, unusable files and interruptions."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The page of `mudskipper live --page` in a real browser, with a simulated robot: on a phone, a tablet and a desk."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -5,8 +5,6 @@ of packages or the project's dependencies change. The guest has no network, so t
 host, for the guest's Python, and installed from a folder.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

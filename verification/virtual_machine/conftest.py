@@ -1,7 +1,5 @@
 """One virtual machine for all checks, booted once; a check that cuts its power boots it again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

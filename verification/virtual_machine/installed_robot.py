@@ -4,8 +4,6 @@ They run in the disk's folder while no systemd runs there. `systemctl enable` wo
 commands that ask a running system to reload (udevadm, networkctl), because the first boot loads everything.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

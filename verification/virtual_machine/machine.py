@@ -8,8 +8,6 @@ of a time stamp counter that runs at 1 GHz, and a second of the guest has three 
 durations run inside the guest; time-outs on the host only end a hanging run.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import os

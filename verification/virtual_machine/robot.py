@@ -1,7 +1,5 @@
 """The robot inside the virtual machine, for an operator with a shell on it."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The daemon's frames on the kernel's own CAN buses, observed with can-utils."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

@@ -1,7 +1,5 @@
 """The daemon with moteus drives on the kernel's CAN FD buses, observed with can-utils."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The daemon is killed, stopped or misconfigured: systemd's reaction, and no robot that arms by itself."""
 
-from __future__ import annotations
-
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION
 from verification.virtual_machine.robot import CONFIGURATION, Robot
 

@@ -1,7 +1,5 @@
 """The requests that users may make through the robot's socket."""
 
-from __future__ import annotations
-
 import pytest
 
 from verification.virtual_machine.robot import UNAUTHORISED, Robot

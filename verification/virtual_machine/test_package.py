@@ -1,7 +1,5 @@
 """The Debian package is installed, checked, upgraded, taken back, removed and purged, in a machine of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """The plug is pulled in the middle of a walk: the next boot finds a sound disk, a readable journal and a whole log."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The installed service under systemd: ready, real-time, without privileges, and readable in the journal."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """The demo walks over a short world to its end, and every signal shuts it down cleanly."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """CAN interfaces are read from the output of several releases of iproute2 and evaluated."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`mudskipper check` examines the source of the pose when no daemon runs."""
 
-from __future__ import annotations
-
 import threading
 import time
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`mudskipper doctor` runs without a daemon, with one, and with a wrong configuration."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

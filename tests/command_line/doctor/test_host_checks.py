@@ -1,7 +1,5 @@
 """The /proc and /sys of a synthetic computer are read and evaluated."""
 
-from __future__ import annotations
-
 import os
 from datetime import UTC, datetime
 from math import inf

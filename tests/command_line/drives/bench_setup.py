@@ -1,7 +1,5 @@
 """A configured robot on simulated buses; the commands of the bench run on it in simulated time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from random import Random

@@ -1,7 +1,5 @@
 """`mudskipper drives find` prints what answers, and refuses a bus that another program uses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

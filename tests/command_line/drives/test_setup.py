@@ -1,7 +1,5 @@
 """`mudskipper drives setup` compares, writes, backs up and restores, and refuses drives that are not as configured."""
 
-from __future__ import annotations
-
 import signal
 import tomllib
 from pathlib import Path

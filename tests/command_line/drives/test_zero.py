@@ -1,7 +1,5 @@
 """`mudskipper drives zero` writes where a joint stands, keeps the rest of the file, and refuses a joint that moves."""
 
-from __future__ import annotations
-
 import re
 import sys
 from math import radians

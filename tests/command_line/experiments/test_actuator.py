@@ -1,7 +1,5 @@
 """`mudskipper experiment actuator`, from the command to the report, with the prompts of its operator."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

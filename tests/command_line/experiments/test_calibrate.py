@@ -1,7 +1,5 @@
 """`mudskipper calibrate`, from the command to the page."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`mudskipper experiment lablogs`: what it refuses, and what it prints and writes of the authors' own logs."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

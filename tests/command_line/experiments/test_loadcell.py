@@ -1,7 +1,5 @@
 """`mudskipper experiment loadcell` from its arguments to its report."""
 
-from __future__ import annotations
-
 import json
 from contextlib import redirect_stdout
 from io import StringIO

@@ -1,7 +1,5 @@
 """`mudskipper init --from-bus` writes the drives that answer, and refuses a bus that does not fit the rig."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

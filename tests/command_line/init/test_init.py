@@ -1,7 +1,5 @@
 """`mudskipper init` writes files that the daemon accepts, and none that it would refuse."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`install` and `uninstall` act on a synthetic system that only records its commands."""
 
-from __future__ import annotations
-
 import json
 import os
 import sysconfig

@@ -1,7 +1,5 @@
 """`mudskipper upgrade`: what another version changes, and when it is not installed."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Sequence

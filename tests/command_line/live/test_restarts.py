@@ -1,7 +1,5 @@
 """The page continues after the daemon, `mudskipper live` or both were stopped and started again, as processes."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

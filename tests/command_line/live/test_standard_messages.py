@@ -1,7 +1,5 @@
 """An independent reader finds named scalars, poses, forces, frames and diagnostics in what viewers are served."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The commands of the log catalogue: `log index`, `log list` and `log query`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import duckdb

@@ -1,7 +1,5 @@
 """Every command that reads a log of the paper's authors reports its problems and their position in the same words."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Commands that read logs print text for an operator and JSON for a program."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """`mudskipper log export` to CSV and Parquet, from the command line."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The commands that list, recover and preserve the logs of a folder."""
 
-from __future__ import annotations
-
 import errno
 import os
 from pathlib import Path

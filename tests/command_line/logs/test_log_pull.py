@@ -1,7 +1,5 @@
 """`mudskipper log pull` copies finished logs once, marks them, and continues; rsync is a double."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`mudskipper log report` makes one page of any log, and one page that compares several runs."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """What commands make of a daemon's answers: a stop succeeds only if every drive has confirmed it."""
 
-from __future__ import annotations
-
 from json import loads
 from pathlib import Path
 from typing import Any

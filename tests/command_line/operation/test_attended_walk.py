@@ -1,7 +1,5 @@
 """An attended walk ends when the command that attends it ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

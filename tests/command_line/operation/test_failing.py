@@ -1,7 +1,5 @@
 """`mudskipper fail` against a real daemon with a simulated robot."""
 
-from __future__ import annotations
-
 import json
 
 from command_line import exit_codes

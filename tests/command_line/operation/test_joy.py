@@ -1,7 +1,5 @@
 """`mudskipper joy`: the dead-man, the keys of a terminal, gamepads that vanish."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

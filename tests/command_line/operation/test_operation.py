@@ -1,7 +1,5 @@
 """An operator's session against a real daemon and a simulated robot, as processes in real time."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

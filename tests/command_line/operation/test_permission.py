@@ -1,7 +1,5 @@
 """A user who is only permitted to stop the robot can do nothing else."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`mudskipper probe` writes what it found into log and configuration, and moves nothing where it is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A user's control law orders the strides of an attended walk or moves joints, and one that fails stops the robot."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A walk lasts for as long as a client calls, under the daemon's lease, and nothing but a new call begins another."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The files for a computer with ROS fit the robot: a stride's definition, the model's joints, the topics of RViz."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from xml.etree import ElementTree

@@ -1,8 +1,6 @@
 """Another client of rmw_zenoh writes the same keys, tokens and attachments."""
 
 # ruff: noqa: E402 - without the oracle there is nothing to import
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis.strategies import text

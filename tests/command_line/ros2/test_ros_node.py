@@ -1,8 +1,6 @@
 """Plain Zenoh clients see the robot as rmw_zenoh shows one: rosbags decodes its messages, and its services answer."""
 
 # ruff: noqa: E402 - without Zenoh there is nothing to import
-from __future__ import annotations
-
 import json
 import socket
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Every path in a layout names a field of our logs, or of a message of `mudskipper live`, that a viewer can show."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`log open` starts an installed viewer with the layout, or names what is missing."""
 
-from __future__ import annotations
-
 import subprocess
 from fcntl import LOCK_EX, flock
 from pathlib import Path

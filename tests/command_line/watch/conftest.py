@@ -1,7 +1,5 @@
 """Robots that tests of the screen share."""
 
-from __future__ import annotations
-
 import pytest
 
 from firmware_host.configuration.configuration import Configuration

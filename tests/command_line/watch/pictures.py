@@ -1,7 +1,5 @@
 """Draws the pictures of the page on `watch` with the screen of a simulated robot: `make watch-pictures`."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A simulated robot with a status socket, both in this process: it answers like the daemon, in simulated time."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator

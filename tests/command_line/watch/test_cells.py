@@ -1,7 +1,5 @@
 """The cells of the screen: the most important text comes first, and values that are not known look so."""
 
-from __future__ import annotations
-
 import copy
 from collections import deque
 from typing import Any

@@ -1,7 +1,5 @@
 """Plain lines are printed at their period, or without a pause if a line takes longer than the period."""
 
-from __future__ import annotations
-
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Rows from the log's writer keep the screen up to date between two status requests."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any

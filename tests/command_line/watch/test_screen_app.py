@@ -1,7 +1,5 @@
 """The screen, driven by textual's own pilot: its keys, its panels, its first line, and a daemon that restarts."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Awaitable, Callable

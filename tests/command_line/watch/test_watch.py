@@ -1,7 +1,5 @@
 """`mudskipper watch` as a process prints plain lines into a pipe, or a screen on a terminal, which it restores."""
 
-from __future__ import annotations
-
 import os
 import pty
 import select

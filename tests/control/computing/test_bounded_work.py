@@ -1,7 +1,5 @@
 """Bounded work runs in its order and gives the same result however many units run at a time."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.computing.bounded_work import Work, WorkQueue, batched

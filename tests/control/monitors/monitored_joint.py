@@ -1,7 +1,5 @@
 """A healthy joint, its monitor and one tick of it, for the tests of a joint's faults."""
 
-from __future__ import annotations
-
 from math import radians
 from typing import Any
 

@@ -3,8 +3,6 @@
 Bounds are pinned from both sides with figures instead of the module's own constants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from itertools import repeat
 from math import cos, inf, nextafter, pi, sin

@@ -3,8 +3,6 @@
 The figures are ticks of 1 / 380 s, pinned without the module's own constants.
 """
 
-from __future__ import annotations
-
 from math import copysign, inf, isfinite, nan, nextafter, radians
 from random import Random
 from typing import Any

@@ -3,8 +3,6 @@
 Ages are exact where a stamp is zero: the age is then the time of the tick.
 """
 
-from __future__ import annotations
-
 from math import inf, nan, nextafter
 from typing import Any
 

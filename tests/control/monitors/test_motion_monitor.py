@@ -1,7 +1,5 @@
 """Motion that torque and path do not explain: a joint of known mechanics, and each bound and sum from both sides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import copysign, inf, nan, nextafter, pi, sin
 

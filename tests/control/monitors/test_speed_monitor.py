@@ -1,7 +1,5 @@
 """Angles that drift away from their speed, and speeds in a wrong range, next to sound joints at any motion."""
 
-from __future__ import annotations
-
 from math import cos, floor, pi, sin
 from random import Random
 

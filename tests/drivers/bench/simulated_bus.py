@@ -1,7 +1,5 @@
 """Simulated drives on a bus of this process, in simulated time, for the commands of the bench."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from random import Random
 from typing import Any

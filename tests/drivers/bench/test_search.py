@@ -1,7 +1,5 @@
 """A search of a bus finds every drive, names ids that answer twice, and never sends a frame that commands torque."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.parameters.joint_limits import JointLimits

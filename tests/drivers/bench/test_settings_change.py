@@ -1,7 +1,5 @@
 """Wherever the writing of settings is interrupted, the drive ends with all the old or all the new ones, as reported."""
 
-from __future__ import annotations
-
 from math import inf, isnan
 from typing import Any
 

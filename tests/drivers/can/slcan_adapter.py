@@ -7,8 +7,6 @@ number and status. Source: LAWICEL CANUSB manual 1.0 and CAN232 manual v3. The o
 robot is reached through the bytes of a real adapter. The owner calls `step`.
 """
 
-from __future__ import annotations
-
 import re
 
 from drivers.can.can_port import CanPort

@@ -1,7 +1,5 @@
 """The load of a bus, against frames that are laid out and stuffed bit by bit."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

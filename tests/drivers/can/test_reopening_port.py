@@ -1,7 +1,5 @@
 """A port that vanishes and comes back, over mock ports, with a clock that the test advances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import pytest

@@ -1,7 +1,5 @@
 """The folder of a simulated robot is private: files that another user prepared are neither used nor followed."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import stat

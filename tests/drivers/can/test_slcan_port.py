@@ -1,7 +1,5 @@
 """A serial CAN adapter: python-can's slcan and pyserial over a pseudo-terminal with an adapter at its other end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -2,8 +2,6 @@
 other end the kernel's bytes are written. The kernel's ancillary data are synthetic: these sockets lose no frames.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import socket

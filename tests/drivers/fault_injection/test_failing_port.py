@@ -1,7 +1,5 @@
 """A failing port next to a sound one on the same traffic: only the injected failure makes a difference."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A pose that fails on purpose."""
 
-from __future__ import annotations
-
 from math import isfinite, isnan
 
 import pytest

@@ -1,7 +1,5 @@
 """Injected failures: refused where they make no sense, ended by themselves, the same for the same seed."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.records import JOINTS, NEVER_S

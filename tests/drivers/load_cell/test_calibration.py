@@ -1,7 +1,5 @@
 """Two weights on a cell: the calibration that they determine, and weights that determine none."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from random import Random

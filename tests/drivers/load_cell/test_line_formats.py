@@ -1,7 +1,5 @@
 """Lines as amplifiers print them, and lines that are no readings."""
 
-from __future__ import annotations
-
 from math import isfinite, isnan
 
 import pytest

@@ -1,7 +1,5 @@
 """A load cell's serial port over a real tty, with failures of the amplifier at its other end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stamps of lines that come in bursts are as even as the measurements were."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

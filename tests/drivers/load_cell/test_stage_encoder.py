@@ -1,7 +1,5 @@
 """A stage's encoder over a real tty, with failures of the counter at its other end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

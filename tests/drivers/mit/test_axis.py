@@ -1,7 +1,5 @@
 """One MIT motor as a joint: what its answers mean, when it follows torque, and which commands are another program's."""
 
-from __future__ import annotations
-
 import struct
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Four ODrives as joints, and the far ends of their two buses, whose frames the tests write."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from control.parameters.joint_limits import JointLimits

@@ -1,7 +1,5 @@
 """The state of one drive over time: restarts, a duplicate node id, the settings of its watchdog."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from math import isnan, nan

@@ -1,7 +1,5 @@
 """One ODrive with firmware 0.5 as a joint: counts before it has moved, held currents, errors, its watchdog."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import isnan, pi
 from typing import Any

@@ -1,7 +1,5 @@
 """NatNet packets: bytes written down by hand, ours as read by an independent decoder, and garbage."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

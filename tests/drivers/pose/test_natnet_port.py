@@ -1,7 +1,5 @@
 """Motion capture over UDP on the loopback; the tests pass the time, so nothing waits."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack

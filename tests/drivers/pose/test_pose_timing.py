@@ -1,7 +1,5 @@
 """The offset of another computer's clock, and the position of a body between two frames."""
 
-from __future__ import annotations
-
 from math import isnan, sin
 from random import Random
 

@@ -1,7 +1,5 @@
 """A counter on a serial line: which lines are counts, and what happens when it is unplugged."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Counts that are positions, and counts that no body on a rail can reach."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.serial.encoder_counts import EncoderCounts

@@ -1,7 +1,5 @@
 """A serial line over a pseudo-terminal: how lines end, what an unplugged cable does, and why a port is refused."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

@@ -1,7 +1,5 @@
 """A free body may rise instead of its flippers going down: the uncertainty against muds whose law is known."""
 
-from __future__ import annotations
-
 from math import inf, log
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A weighing with scripted robot, joint, weights and operator, for tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path

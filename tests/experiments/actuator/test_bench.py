@@ -1,7 +1,5 @@
 """The operator is asked to take a weight off before the torque goes off, however a calibration ends."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

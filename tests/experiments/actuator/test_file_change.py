@@ -1,7 +1,5 @@
 """A configuration file is changed in place: atomically, only in the requested keys, and never to an invalid file."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The fit of a motor agrees with numpy's line through the same points, and its errors cover the truth often enough."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, isnan
 from random import Random

@@ -1,7 +1,5 @@
 """Friction from loops is recovered from synthetic motions with known friction, and from a simulated joint."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import copysign, cos, pi, sin
 from pathlib import Path

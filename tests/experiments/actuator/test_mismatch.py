@@ -1,7 +1,5 @@
 """A reading of a weight other than the requested one is detected."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments.actuator.mismatch import find_mismatch

@@ -1,7 +1,5 @@
 """A plan is checked against the configuration before a weight is hung."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

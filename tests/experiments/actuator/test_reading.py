@@ -1,7 +1,5 @@
 """A simulated joint is read like a real one: level, after an approach from each side, and settled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import degrees

@@ -1,7 +1,5 @@
 """The report of a calibration shows the results and their sources."""
 
-from __future__ import annotations
-
 from experiments.actuator.fit import fit_joint
 from experiments.actuator.report import make_result
 from tests.experiments.actuator.test_fit import PLAN, make_entries

@@ -1,7 +1,5 @@
 """The sequence of a calibration: the operator's answers, failures, and continuation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

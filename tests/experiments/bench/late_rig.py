@@ -4,8 +4,6 @@ A late drive executes the waiting commands in their order and then catches up wi
 that emulates drives in real time.
 """
 
-from __future__ import annotations
-
 from random import Random
 
 from control.rate import PERIOD_S

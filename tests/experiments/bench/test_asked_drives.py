@@ -1,7 +1,5 @@
 """The bench with drives that can only be asked by a command: watchdogs are measured without asking in between."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A shake finds a stuck encoder before the joint moves far, and passes a working one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """On a busy computer the bench passes a sound robot, and reports late ticks and messages with a failed check."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The operator at a real bench answers prompts."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments.bench.operator import BenchOperator

@@ -1,7 +1,5 @@
 """The rig of the bench uses real buses in real time and refuses other programs that command the drives."""
 
-from __future__ import annotations
-
 import signal
 import socket
 import subprocess

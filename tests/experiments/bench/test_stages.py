@@ -1,7 +1,5 @@
 """The whole bench, as an operator starts it, is refused, passes a sound robot, and finds a reversed encoder."""
 
-from __future__ import annotations
-
 import json
 import socket
 import subprocess

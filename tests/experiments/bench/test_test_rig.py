@@ -1,7 +1,5 @@
 """Every failure at the bench ends with idle drives and a message; readings are reported unchanged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 The stages are the tests of tests/bench themselves, called one after the other until one of them fails.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A calibration continues after an interruption at any prompt, and belongs to its configuration and drives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date

@@ -1,7 +1,5 @@
 """Hands alone, without torque, show each error of a configuration: the robot is built otherwise than configured."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from math import degrees
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The weighing of a real robot has a daemon of its own, in real time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from experiments.calibration.robots import running_daemon

@@ -1,7 +1,5 @@
 """Campaigns: the points of a file, its refusals, equal digits wherever walks run, and what an interruption leaves."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

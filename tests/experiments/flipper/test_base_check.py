@@ -1,7 +1,5 @@
 """A base that moved in a trial is reported; one that did not move is not."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.modes import Mode

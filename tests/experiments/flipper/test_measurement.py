@@ -1,7 +1,5 @@
 """The single flipper's trials: the configuration they need, invalid trials, and the report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The forces by the laws equal the measured forces in mud that follows the laws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pandas import DataFrame, Series

@@ -1,7 +1,5 @@
 """Logs are found in folders, and their names say which mud they were measured in."""
 
-from __future__ import annotations
-
 from itertools import chain
 from pathlib import Path
 

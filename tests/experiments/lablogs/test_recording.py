@@ -1,7 +1,5 @@
 """Each disturbance changes the columns as it claims, and mud is distinguished from air by torque."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mud that follows the laws of the coefficients exactly, and the force that a load cell on a stage measures in it."""
 
-from __future__ import annotations
-
 from random import Random
 
 import numpy as np

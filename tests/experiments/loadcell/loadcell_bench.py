@@ -1,7 +1,5 @@
 """An emulated bench with everything that an experiment with a load cell needs, and a scripted operator."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An encoder of the stage and the load cell, over both serial ports: measurement, remarks, and continuation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

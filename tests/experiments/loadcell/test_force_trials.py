@@ -1,7 +1,5 @@
 """Coefficients from force against time alone, in muds with known ones and in clay against its noise-free curve."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

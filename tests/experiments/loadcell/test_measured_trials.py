@@ -1,7 +1,5 @@
 """A manual stage with an encoder: lag, gaps, wrong encoders, and how clay follows the speed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Positions between the encoder's lines: means, gaps, and the error of interpolation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trials are measured, checked and recovered over the serial port of an emulated amplifier."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

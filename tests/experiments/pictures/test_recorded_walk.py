@@ -1,7 +1,5 @@
 """A walk from this project's log agrees with the log's rows, and one from an authors' log agrees with the replay."""
 
-from __future__ import annotations
-
 import gzip
 from io import StringIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The side view of the flipper agrees with the kinematics of control/ and with the plate's integrals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The strides and moments to be shown are chosen correctly from walks that are synthesised row by row."""
 
-from __future__ import annotations
-
 from math import nan, radians
 from typing import Any
 

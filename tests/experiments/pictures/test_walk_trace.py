@@ -1,7 +1,5 @@
 """Traces of long walks: no peak is lost, and strides begin, end and read as in the whole log."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coefficients over trials, next to those of a load cell, and the files from which they are read."""
 
-from __future__ import annotations
-
 import json
 from math import hypot, nan, sqrt
 from pathlib import Path

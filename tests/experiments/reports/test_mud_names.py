@@ -1,7 +1,5 @@
 """A water content is recognised in every spelling; a name that an operator gave a mud stays unchanged."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments.reports.mud_names import mud_key, mud_label, mud_name, mud_text

@@ -1,7 +1,5 @@
 """A value is printed with exactly as many digits as its errors justify."""
 
-from __future__ import annotations
-
 from math import inf, nan
 
 import pytest

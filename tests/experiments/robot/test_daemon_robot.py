@@ -1,7 +1,5 @@
 """An experiment operates a robot through a daemon's socket in real time: its calls, its lease, and the growing log."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

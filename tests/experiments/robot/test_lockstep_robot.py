@@ -1,7 +1,5 @@
 """An experiment operates a simulated robot through the daemon's calls, and the log contains what it did."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

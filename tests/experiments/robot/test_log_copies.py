@@ -1,7 +1,5 @@
 """Copies contain all segments of a daemon's run that cover an experiment, whole, and can be read by themselves."""
 
-from __future__ import annotations
-
 import dataclasses
 import errno
 import os

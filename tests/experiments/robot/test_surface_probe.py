@@ -1,7 +1,5 @@
 """A probe finds the mud's surface within the error that it claims, and says where there is none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import radians
 from pathlib import Path

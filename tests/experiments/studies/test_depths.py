@@ -1,7 +1,5 @@
 """Walks at depths in turn measure how a mud changes with depth, and count what was not the mud's."""
 
-from __future__ import annotations
-
 import pytest
 from pandas import DataFrame
 

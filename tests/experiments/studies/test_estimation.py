@@ -1,7 +1,5 @@
 """The estimation study: its trials, a short part of it in simulation, and its tables and picture."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

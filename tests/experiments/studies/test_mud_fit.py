@@ -1,7 +1,5 @@
 """The mud fit recovers a synthetic truth, and walks the plant that it reports."""
 
-from __future__ import annotations
-
 from math import log
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The depth sweep of synthetic walks: what is counted, where a method settles, and the picture."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

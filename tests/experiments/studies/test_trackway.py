@@ -1,7 +1,5 @@
 """The trackway study: Table I of synthetic walks, and a short trackway in simulation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A Dask scheduler and its workers as processes of their own, for tests; they end with the context."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Trials on a Dask cluster of real processes: the same digits, lost workers, and clusters that cannot be used."""
 
-from __future__ import annotations
-
 import gc
 import shutil
 from functools import partial

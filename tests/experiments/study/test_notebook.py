@@ -1,7 +1,5 @@
 """Every measurement is written to the disk and is read again when the same experiment continues."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

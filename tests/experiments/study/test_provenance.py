@@ -1,7 +1,5 @@
 """The digest of a study's sources changes with what the study computes with, and with nothing else."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

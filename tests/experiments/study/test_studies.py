@@ -1,7 +1,5 @@
 """The shape of a study: from one file in a folder to a command with options, resuming, a page, tables and JSON."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator

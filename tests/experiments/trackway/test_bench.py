@@ -1,7 +1,5 @@
 """Table I is measured through the daemon's calls; every walk stops in time, and its log gives the table."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import partial

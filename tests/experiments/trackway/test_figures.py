@@ -1,7 +1,5 @@
 """The walks of an experiment are drawn from the logs in its folder, without the robot's other activities."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

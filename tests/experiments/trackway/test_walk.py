@@ -1,7 +1,5 @@
 """Strides of a walk: their begin and end, the names of their failures, and those of a log compared with the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan, nan

@@ -1,7 +1,5 @@
 """The paper's law below a known surface gives the right coefficient, also while the body advances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pandas import DataFrame

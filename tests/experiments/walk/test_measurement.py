@@ -1,7 +1,5 @@
 """Walks over several muds: the mud of each stride, with and without a pose, and the paper's findings next to ours."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache, partial

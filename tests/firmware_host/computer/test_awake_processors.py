@@ -1,7 +1,5 @@
 """The processors stay awake exactly while torque is on; where this is not permitted the robot still walks."""
 
-from __future__ import annotations
-
 import os
 import struct
 from pathlib import Path

@@ -3,8 +3,6 @@
 These settings change a process permanently, so every test uses a child process.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

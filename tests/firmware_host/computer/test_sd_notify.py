@@ -1,7 +1,5 @@
 """systemd receives the daemon's notifications, and a systemd that does not listen never disturbs the loop."""
 
-from __future__ import annotations
-
 import os
 import socket
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A configuration is accepted as a whole, or refused with the names of the wrong keys before anything is opened."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

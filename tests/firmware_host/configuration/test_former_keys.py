@@ -1,7 +1,5 @@
 """Keys of version 0.1 are accepted under their former names, with a warning."""
 
-from __future__ import annotations
-
 from operator import attrgetter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Records are read from nested TOML tables, arrays and changes, and every problem is reported with its key."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The daemon's parts fail on purpose: the ticker stalls, the wall clock steps, the log loses rows."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.rate import PERIOD_S

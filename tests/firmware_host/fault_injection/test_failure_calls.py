@@ -1,7 +1,5 @@
 """The methods that inject failures appear in log and status."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

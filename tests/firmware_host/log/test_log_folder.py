@@ -1,7 +1,5 @@
 """The quota deletes the oldest logs and never certain others; logs are named by their run."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Two readers that share no code with the project, rosbags and mcap-ros2-support, must see the same values.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

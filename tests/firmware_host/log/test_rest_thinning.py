@@ -1,7 +1,5 @@
 """At rest only some ticks are written; around torque and around every change of mode all are."""
 
-from __future__ import annotations
-
 import pytest
 
 from control.modes import Mode

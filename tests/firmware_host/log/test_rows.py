@@ -1,7 +1,5 @@
 """Every value of a tick and of a stride is in the field that has its name."""
 
-from __future__ import annotations
-
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.records import (

@@ -1,7 +1,5 @@
 """Rows of other versions are read with the layouts in their logs."""
 
-from __future__ import annotations
-
 from math import isnan
 
 import pytest

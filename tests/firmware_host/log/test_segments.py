@@ -1,7 +1,5 @@
 """The files of one run: each is complete, no row is lost or doubled between them, and a full disk is handled."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

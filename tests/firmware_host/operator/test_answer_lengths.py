@@ -1,7 +1,5 @@
 """No answer of the socket is long, even with every fault present, because it is computed between two ticks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgpack

@@ -1,7 +1,5 @@
 """The list of `mudskipper check` fails in exactly the lines whose faults block arming."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The methods of the socket: the log names each sender, and the lease decides who may move the robot."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import nan, radians
 from typing import Any

@@ -1,7 +1,5 @@
 """A status socket with its own clock, and clients with the credentials that a test chooses."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path

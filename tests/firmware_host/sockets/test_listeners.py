@@ -1,7 +1,5 @@
 """Accounts that flood the public socket delay a stop only briefly, and operators not at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 import resource

@@ -1,7 +1,5 @@
 """Malformed requests and parameters are refused with a message, within bounded memory."""
 
-from __future__ import annotations
-
 import tracemalloc
 from math import inf, nan
 from typing import Any

@@ -4,8 +4,6 @@ An example is what several clients send at once, each as an operator, a reader, 
 requests first, then random, mutated, truncated or nested data, in pieces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

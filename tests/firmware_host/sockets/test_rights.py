@@ -1,7 +1,5 @@
 """Rights follow from the credentials that the kernel gives, and from groups looked up at the start."""
 
-from __future__ import annotations
-
 import grp
 import os
 import socket

@@ -1,7 +1,5 @@
 """A socket's file has its permissions from the start, is removed by its daemon, and replaces no live socket."""
 
-from __future__ import annotations
-
 import os
 import socket
 import stat

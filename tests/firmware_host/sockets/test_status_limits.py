@@ -1,7 +1,5 @@
 """No client excludes others from the status socket by speed, slowness, or number."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 from pathlib import Path

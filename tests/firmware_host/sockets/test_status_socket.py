@@ -1,7 +1,5 @@
 """The status socket answers valid requests, rejects others, and never blocks the loop."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 from typing import Any

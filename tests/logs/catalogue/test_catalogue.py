@@ -1,7 +1,5 @@
 """The catalogue knows every closed log of a folder, reads each once, and cannot be changed by a query."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whole, cut and damaged logs are read as far as possible, or refused with one sentence."""
 
-from __future__ import annotations
-
 import random
 import struct
 from pathlib import Path

@@ -1,7 +1,5 @@
 """All contents of logs of other versions are read, and missing fields are marked as missing."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

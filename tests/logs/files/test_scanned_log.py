@@ -1,7 +1,5 @@
 """Logs of any length: read in blocks, in order, in little memory, and refused if cut off meanwhile."""
 
-from __future__ import annotations
-
 import os
 import random
 import tracemalloc

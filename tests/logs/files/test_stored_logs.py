@@ -1,7 +1,5 @@
 """A finished log is preserved and comes back; what is not whole, or would replace another log, stays where it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

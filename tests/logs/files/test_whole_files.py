@@ -1,7 +1,5 @@
 """A file is either written completely or unchanged; a device or a pipe is written to and never replaced."""
 
-from __future__ import annotations
-
 import os
 import stat
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A known advance, sinking and pitch are recovered from a capture at any heading."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

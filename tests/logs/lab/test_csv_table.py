@@ -1,7 +1,5 @@
 """The authors' CSV is read in all its forms: heads, line ends, compression, torn rows, empty cells."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Callable
 from pathlib import Path

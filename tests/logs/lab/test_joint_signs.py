@@ -1,7 +1,5 @@
 """The signs of joints are found in mud and in air, and a stroke that contradicts them is named and left out."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 The measurements are no part of this project; they are searched next to it or in MUDSKIPPER_SHARED_DATA.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import math

@@ -1,7 +1,5 @@
 """Invalid logs are refused, invalid parts are left out, and both are reported with position and reason."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A belt with play against the mechanics of two bodies that collide."""
 
-from __future__ import annotations
-
 from math import radians
 
 import pytest

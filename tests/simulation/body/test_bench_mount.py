@@ -1,7 +1,5 @@
 """On a bench the torques of arm and weight equal the slope of their potential energy, and no energy is created."""
 
-from __future__ import annotations
-
 from math import cos, sin
 
 import pytest

@@ -1,7 +1,5 @@
 """Simulated drives of one type on one bus with the axes that command them, in simulated time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from random import Random
 from typing import Any

@@ -1,7 +1,5 @@
 """What every simulated drive does alike, commanded and read by the axes of its type over a bus."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import exp, isfinite
 from random import Random

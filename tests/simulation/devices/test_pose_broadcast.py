@@ -1,7 +1,5 @@
 """The simulated pose at every source, and the effect of its delay on estimates."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Iterator

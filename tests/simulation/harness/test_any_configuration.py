@@ -4,8 +4,6 @@ The records define the fields, their bounds and their defaults, as for the reade
 where its supply counts as too low, but no tick raises, and a robot that is not armed sends no frame that moves a drive.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass

@@ -1,7 +1,5 @@
 """The simulated robot runs in real time, also on a busy computer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

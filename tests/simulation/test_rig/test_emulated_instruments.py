@@ -1,7 +1,5 @@
 """The emulated amplifier is read through its tty with only the operating system's calls."""
 
-from __future__ import annotations
-
 import os
 import termios
 import tty

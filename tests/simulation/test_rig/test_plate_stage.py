@@ -1,7 +1,5 @@
 """The stage's position follows its motion profile in steps of any length."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from random import Random
 

@@ -1,7 +1,5 @@
 """ODrive's messages as other programs send them: `odrive_can`, and the makers' DBC of both firmwares."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The published energy bounds follow from torque, speed and time, and no healthy motion of full torque exceeds them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Every fault occurs once in a simulated robot and the reaction passes; the evaluation of a cell can also fail."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`mudskipper experiment faults`: which cells it runs, what it refuses, and what it makes of any cells."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
