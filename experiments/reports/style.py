@@ -14,7 +14,9 @@ MUD, SURFACE = "#cdb48f", "#8a6d45"  # seen from the side
 BODY = "#ece8e1"
 FLIPPER_COLOURS = {"left": "#5aa5c4", "right": "#1f6f8b"}
 TRAIL = "#b5462f"
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9")  # C0, C1 ...: Okabe and Ito's
+PALETTE = (  # C0, C1 ...: Okabe and Ito's, then darker ones
+    "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9", "#6b0f1a", "#8c867d", "#b8a200", "#33302c",
+)  # fmt: skip
 FORWARD, UP, FORCE = "#d55e00", "#0072b2", "#8e24aa"
 OUTCOME_COLOURS = {"good": "#0072b2", "slipping": "#e69f00", "stuck": "#6b0f1a", "unknown": FAINT}
 STYLE: dict[Any, Any] = {
