@@ -62,6 +62,16 @@ def short_folder() -> Iterator[Path]:
         yield Path(folder)
 
 
+@pytest.fixture(scope="module")
+def png_alone() -> Iterator[None]:
+    """Write pictures as PNG alone, for tests that need a page and not all of its files."""
+    from experiments.study import page  # slow to import
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "ENDINGS", (".png",))
+        yield
+
+
 @pytest.fixture(scope="session")
 def walked_twice(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> tuple[Path, Lockstep]:
     """Record a log in which the robot walks two strides, holds, and walks one more; return it and the robot."""

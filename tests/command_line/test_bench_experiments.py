@@ -8,6 +8,8 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
 
 

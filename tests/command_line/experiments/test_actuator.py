@@ -26,6 +26,8 @@ from simulation.mud.track import paper_track
 from tests.command_line.experiments.test_conduct import typed
 from tests.experiments.actuator.test_fit import make_entries
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 SHORT = (
     "experiment",
     "actuator",

@@ -11,6 +11,8 @@ from experiments.calibration.robots import CalibratedRobot
 from firmware_host.configuration.loading import load_configuration
 from tests.experiments.calibration.test_calibration import TRUE_NM_A, WeighedRobot
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
 
 

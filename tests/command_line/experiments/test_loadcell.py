@@ -16,6 +16,8 @@ from simulation.test_rig.load_cell import measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE
 from tests.command_line.experiments.test_conduct import typed
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 SHORT = ["experiment", "loadcell", "--simulated", "--json", "--trials", "1", "--mud", "48.6"]
 PLATE = {"width": 0.025, "height": 0.07, "thickness": 0.004}
 FLIPPER = {

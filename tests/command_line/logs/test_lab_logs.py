@@ -15,6 +15,8 @@ from logs.replay import Replay
 from tests.command_line.command_lines import json_of, run
 from tests.lab_logs import SETTINGS, lab_columns, write_lab_log
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 COMMANDS = {
     "replay": ("replay",),
     "log info": ("log", "info"),

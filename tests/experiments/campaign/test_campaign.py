@@ -19,6 +19,8 @@ from logs.catalogue.catalogue import Catalogue
 from logs.catalogue.entry import COLUMNS, TRIALS
 from tests.folders import ROOT
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 SHORT = """
 seeds = 2
 [walk]

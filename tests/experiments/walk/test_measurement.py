@@ -27,6 +27,8 @@ from experiments.walk.report import Report, compared_strides, result_of, walks_o
 from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 SHORT = WalkTrials((("47.6", 0.3), ("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
 ALL_METHODS = [DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED]
 TINY = WalkTrials((("47.6", 0.2),), trials=1, simulated=True)

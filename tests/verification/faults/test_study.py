@@ -19,6 +19,8 @@ from verification.faults.evaluation import Cell
 from verification.studies import healthy_walks
 from verification.studies.faults import FAULTS, study
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 COMMAND = ["experiment", "faults", "--simulated"]
 
 
