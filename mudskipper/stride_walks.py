@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
+from math import fsum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,7 +68,7 @@ class SimulatedWalk:
             reports=[stride_report(each.estimate) for each in loop.learning.strides[-flippers:]],
             advance_m=plant.body_m - begun_m,
             duration_s=lockstep.now_s - begun_s,
-            energy_j=sum(max(0.0, joint.work_j) for joint in self._energy.joints),
+            energy_j=fsum(max(0.0, joint.work_j) for joint in self._energy.joints),
             fault="" if walks else str(loop.fault or loop.mode.name.lower()),
             body_m=plant.body_m,
         )
@@ -123,7 +124,7 @@ class DaemonWalk:
             reports=reports,
             advance_m=(last["body_x_m"] or 0.0) - (first["body_x_m"] or 0.0),
             duration_s=last["now_s"] - first["now_s"],
-            energy_j=sum(max(0.0, each) for each in work_j),
+            energy_j=fsum(max(0.0, each) for each in work_j),
             fault="" if last["mode"] == "walking" else fault,
             body_m=last["body_x_m"] or 0.0,
         )
