@@ -74,6 +74,10 @@ class Gait(_Tables):
     """
 
     def __init__(self, file: str | Path | None = None, /, **tables: Any) -> None:
-        super().__init__(({} if file is None else gait_document(str(file))) | tables)
+        try:
+            document = {} if file is None else gait_document(str(file))
+        except FileNotFoundError as problem:
+            raise ConfigurationError([f"{problem.filename}: {problem.strerror}"]) from None
+        super().__init__(document | tables)
         if problems := list(key_problems(read_gait(self.tables))):
             raise ConfigurationError(problems)
