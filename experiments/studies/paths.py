@@ -1,9 +1,10 @@
 """The coefficients from paths that are no crutching gait, and how well they predict the next stride.
 
-Each gait that ships walks through muds of known strength. The truth of an estimate is a plate on a virtual load cell in
-the same mud, at the depth and the speed that the estimate names (experiments/trials/load_cell_truth.py), so no gait is
-the reference of another one. The mud is as fresh in every stride. The next stride is predicted by what the robot
-remembers before it, at the depth that it reaches: its force is the coefficient times a geometry that is known.
+Each gait that ships walks through muds of known strength, with the disturbances of `estimation`. The truth of an
+estimate is a plate on a virtual load cell in the mud that the flipper met, at the speed and the depth that the estimate
+names (experiments/trials/load_cell_truth.py), so no gait is the reference of another one. The next stride is predicted
+by what the robot remembers before it, at the depth that it reaches: its force is the coefficient times a geometry that
+is known.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,27 +16,27 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
 
-from control.controller import WalkOrder
+from control.gait.stride_table import crutching_parameters
 from control.geometry import FlipperGeometry
-from control.modes import Mode
 from control.records import COEFFICIENTS, UNKNOWN, Estimate, StrideEstimate
+from estimation.estimation_parameters import EstimationParameters
 from estimation.knowledge import MudKnowledge
 from experiments.reports.coefficient_table import compared_frame, compared_rows
 from experiments.reports.error_table import error_frame
-from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
-from experiments.trials.load_cell_truth import REVERSAL_FRACTION, true_coefficients
+from experiments.trials.load_cell_truth import REVERSAL_FRACTION, FlipperTruths, true_strides
+from experiments.trials.trial import LATENCY_S, TORQUE_ERROR, WALKING, Setup, replay_trial, run_trial
 from firmware_host.configuration.gait_file import gait_document, read_gait
 from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import Clay
-from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
 GAITS = ("walking", "measuring", "ellipse", "alternating", "backward")
-LONGEST_STRIDE_S = 12.0
+ENDLESS_M = 1000.0
 
 
 def study(
@@ -45,7 +46,7 @@ def study(
     strength: Annotated[tuple[float, ...], Option("of a mud", low=100, high=5e4, unit="Pa")] = (800.0, 1400.0, 3600.0),
     depth: Annotated[float, Option("of insertion", low=1, high=5, unit="cm")] = 3.0,
     strides: Annotated[int, Option("of a walk", low=3, high=200)] = 8,
-    seeds: Annotated[int, Option("walks in each mud", low=1, high=100)] = 3,
+    seeds: Annotated[int, Option("walks in each mud", low=1, high=100)] = 5,
 ) -> Result:
     """The coefficients of a mud from paths other than the crutching gait."""
     for name in gait:
@@ -66,6 +67,7 @@ def study(
             Table("speeds", "Advance by gait", {"strength_pa": "Pa", "speed_cm_s": "cm/s"}, speeds),
             Table("errors", "Errors by gait and mud", {}, errors_of(found, "setup", "mud", "coefficient")),
             Table("pooled", "Errors by gait, all muds", {}, errors_of(found, "setup", "coefficient")),
+            Table("overall", "Errors of all gaits and muds", {}, errors_of(found, "coefficient")),
         ],
         figures=[Figure("paths", "Estimate over truth by gait; the band is 10 %.", lambda: draw(found))],
     )
@@ -74,50 +76,57 @@ def study(
 def walk(gait: str, strength_pa: float, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
     """Return the speed of a walk, and its estimates with their truths and predictions."""
     clay = Clay(f"{strength_pa:g} Pa", strength_pa)
-    order = WalkOrder(depth_m, adaptive=False, strides=strides, gait=read_gait(gait_document(gait)))
-    noisy = replace(NONE, current_noise_a=LAB.current_noise_a)
-    robot = start_walk(simulated_configuration(), Track([(1000.0, clay)]), seed, order, disturbances=noisy)
-    begun_s = robot.now_s
-    robot.run_until(lambda: robot.loop.mode is not Mode.WALKING, LONGEST_STRIDE_S * strides)
-    closed = [each.estimate for each in robot.loop.learning.strides]
-    speed_cm_s = 100.0 * robot.robot.plant.body_m / (robot.now_s - begun_s)
-    rows = _compared(closed, clay, robot.loop.configuration.geometry, setup=gait, method="default", trial=seed)
-    return {"speed_cm_s": speed_cm_s, "stuck": sum(not each.released for each in closed), "estimates": list(rows)}
+    track = Track([(ENDLESS_M, clay)])
+    trial = run_trial(setup_of(gait, depth_m), track, LAB, strides, seed, TORQUE_ERROR, LATENCY_S)
+    first, last = trial.samples[0], trial.samples[-1]
+    closed = [stride for stride, _ in replay_trial(trial, EstimationParameters(surface_error_m=LAB.surface_error_m))]
+    met = {(truth.flipper, truth.index): truth for truth in trial.truths}
+    geometry = trial.configuration.geometry
+    strokes = [_strokes_of(each, met[key], geometry) for each in closed if (key := (each.flipper, each.index)) in met]
+    truths = true_strides(strokes, trial.configuration, LAB.relaxation)
+    rows = _compared(closed, truths, mud=clay.name, setup=gait, method="default", trial=seed)
+    return {
+        "speed_cm_s": 100.0 * (last.body.x_m - first.body.x_m) / (last.now_s - first.now_s),
+        "stuck": sum(not each.released for each in closed),
+        "estimates": list(rows),
+    }
 
 
-def _compared(
-    closed: Sequence[StrideEstimate], clay: Clay, geometry: FlipperGeometry, **keys: Any
-) -> Iterator[dict[str, Any]]:
+def setup_of(gait: str, depth_m: float) -> Setup:
+    path = read_gait(gait_document(gait))
+    parameters = crutching_parameters(path)
+    setup = replace(WALKING, depth_m=depth_m, path=path)
+    return replace(setup, path=None, gait=parameters) if parameters else setup
+
+
+def _strokes_of(stride: StrideEstimate, met: StrideTruth, geometry: FlipperGeometry) -> StrideTruth:
+    """Return the strokes that the estimates name in the mud that the flipper met, for a load cell to repeat."""
+
+    def stroke(estimate: Estimate, part: float = 1.0) -> StrokeTruth:
+        nominal_m = estimate.depth_m / part + stride.surface_m
+        lean_rad, depth_m = geometry.adduction_rad(0.0, nominal_m), nominal_m - met.surface_m
+        return StrokeTruth(0.0, lean_rad, depth_m, estimate.speed_m_s, UNKNOWN, depth_m)
+
+    return replace(
+        met,
+        insertion=stroke(stride.k_p),
+        stance=stroke(stride.k_s),
+        extraction=stroke(stride.k_e, 1.0 - REVERSAL_FRACTION),  # which names the depth where its fit begins
+    )
+
+
+def _compared(closed: Sequence[StrideEstimate], truths: FlipperTruths, **keys: Any) -> Iterator[dict[str, Any]]:
     """Yield the rows of each stride, with the logarithm of predicted over estimated value."""
     knowledge = MudKnowledge()
     for stride in closed:
         remembered = knowledge.mud_estimate.of(stride.flipper)
-        truths = true_coefficients(_truth_of(stride, clay), geometry, 0.0, 0.0, upright=False)
-        for row in compared_rows(stride_report(stride), truths, mud=clay.name, **keys):
+        for row in compared_rows(stride_report(stride), truths.get((stride.flipper, stride.index), {}), **keys):
             before, row["predicted"] = getattr(remembered, row["coefficient"]), UNKNOWN
             if row["kind"] == "value" and before is not None and not before.at_least:
                 row["predicted"] = log(before.at(row["depth_m"])[0] / row["value"])
             if row["truth"] is not None:
                 yield row
         knowledge.update([stride])
-
-
-def _truth_of(stride: StrideEstimate, clay: Clay) -> StrideTruth:
-    """Return the strokes that the estimates name, for a load cell to repeat."""
-
-    def stroke(estimate: Estimate, part: float = 1.0) -> StrokeTruth:
-        depth_m = estimate.depth_m / part
-        return StrokeTruth(0.0, 0.0, depth_m, estimate.speed_m_s, estimate.depth_m, depth_m)
-
-    return StrideTruth(
-        flipper=stride.flipper,
-        index=stride.index,
-        ground=clay,
-        surface_m=0.0,
-        insertion=stroke(stride.k_p),
-        stance=stroke(stride.k_s),
-        extraction=stroke(stride.k_e, 1.0 - REVERSAL_FRACTION),  # which names the depth where its fit begins
-    )
 
 
 def errors_of(found: DataFrame, *keys: str) -> DataFrame:

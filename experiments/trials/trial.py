@@ -19,6 +19,7 @@ from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
 from control.rate import PERIOD_S
 from control.records import BodyPose, DriveStates, Phase, StrideEstimate
 from drivers.drive_types import DEFAULT
@@ -28,6 +29,7 @@ from estimation.mud import MudEstimator
 from experiments.reports.coefficient_table import compared_rows
 from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.trials.load_cell_truth import FlipperTruths
+from experiments.trials.path_reference import PathReference
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.gait_file import PROTOCOLS
 from firmware_host.operator.reports import stride_report
@@ -62,6 +64,7 @@ class Setup:
     row_period_s: float  # rows between two new samples repeat the last one; 0: every row is new
     depth_m: float = 0.03
     geometry: FlipperGeometry = FlipperGeometry()
+    path: GaitPath | None = None  # walked in place of the gait
 
 
 # The authors' logs hold 50 to 110 distinct states a second of a single flipper, up to 210 of the walking robot.
@@ -106,9 +109,10 @@ def run_trial(
     largest latency between current and angle.
     """
     configuration = configuration_of(setup)
-    order = WalkOrder(setup.depth_m, adaptive=False)
+    order = WalkOrder(setup.depth_m, adaptive=False, gait=setup.path)
     robot = start_walk(configuration, track, seed, order, disturbances=disturbances, fixed_base=setup.fixed_base)
-    reference, samples, truths = StrokeReference(configuration.rig), list[Sample](), list[StrideTruth]()
+    reference = (PathReference if setup.path else StrokeReference)(configuration.rig)
+    samples, truths = list[Sample](), list[StrideTruth]()
     first, end_s = _sample_of(robot), robot.now_s + strides * LONGEST_STRIDE_S
     while len(truths) < len(configuration.rig.flippers) * strides and robot.now_s < end_s:
         robot.step()
