@@ -26,8 +26,9 @@ def mud(strength_pa: float) -> dict[str, Any]:
 
 
 @pytest.mark.filterwarnings("error")
-def test_gymnasium_s_own_checker_finds_nothing() -> None:
-    check_env(gymnasium.make(ENV, render_mode="rgb_array", backend="direct", duration_s=2.0).unwrapped)
+@pytest.mark.parametrize("backend", ["direct", "lockstep"])
+def test_gymnasium_s_own_checker_finds_nothing(backend: str) -> None:
+    check_env(gymnasium.make(ENV, render_mode="rgb_array", backend=backend, duration_s=2.0).unwrapped)
 
 
 def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> None:
