@@ -17,10 +17,10 @@ u on m inflates it by the noise of m:
 
 A motor is too strong if the lower bound is, and too weak if the upper one is. Where the two are further apart than
 SAME_FRACTION, the strokes had too little acceleration for a verdict. A rotor with the encoder that crosses the play of
-a belt moves alone, up to three times as easily as its joint, which scatters the sweep's points: r² was 0.67 at most
-where they gave a wrong gain, and 0.83 or more with a wrong constant. A sweep that the mud lets go of is thrown through
-that play, so no block counts that is faster than any path. One stride proves a gain beyond a factor of 2, three
-strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+a belt moves alone, up to three times as easily as its joint, which looks like a strong motor and scatters the sweep's
+points: r² was 0.67 at most where they gave a wrong gain, and 0.83 or more with a constant that is too large. A sweep
+that the mud lets go of is thrown through that play, so no block counts that is faster than any path. One stride proves
+a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -45,7 +45,7 @@ FAST_RAD_S = 10.0  # of a joint that the mud has let go: faster than its path
 LEAST_BLOCKS = 7  # of a phase
 LEAST_NM2 = 1e-6  # of Σ u² about the mean: a torque at its limit varies by the rounding of floats
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
-SAME_IN_SWING = 0.75  # more than with a rotor that crosses the play of its belt
+SAME_IN_SWING = 0.75  # of a strong motor: more than with a rotor that crosses the play of its belt
 FACTOR_OF_ONE, FACTOR_OF_THREE = 2.0, 1.6
 STRIDES = 3
 
@@ -66,12 +66,13 @@ class Moments(NamedTuple):
         """Return whether the torques have few causes but the motion: in mud, a lower bound of the gain near zero."""
         return self.blocks >= LEAST_BLOCKS and FACTOR_OF_THREE * self.um > self.uu
 
-    def gain_beyond(self, factor: float, same_fraction: float = SAME_FRACTION) -> float | None:
+    def gain_beyond(self, factor: float, same_if_strong: float = SAME_FRACTION) -> float | None:
         """Return the gain, if it is certainly beyond this factor or its inverse."""
         blocks, uu, um, mm = self
-        if blocks < LEAST_BLOCKS or uu < LEAST_NM2 or um <= 0.0 or um * um < same_fraction * uu * mm:
+        if blocks < LEAST_BLOCKS or uu < LEAST_NM2 or um <= 0.0:
             return None
-        if um > factor * uu or factor * mm < um:
+        same = um * um / (uu * mm)
+        if (um > factor * uu and same >= same_if_strong) or (factor * mm < um and same >= SAME_FRACTION):
             gain: float = (mm / uu) ** 0.5
             return gain
         return None
@@ -80,9 +81,9 @@ class Moments(NamedTuple):
 class JointStrokes:
     """Owns the sums of one joint: of the stroke under way, of the stride under way, and of the last strides."""
 
-    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction, same_fraction: float) -> None:
+    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction, same_if_strong: float) -> None:
         self.joint = joint
-        self._same_fraction = same_fraction
+        self._same_if_strong = same_if_strong
         self.inertia_kg_m2 = inertia_kg_m2
         self.friction = None if friction == NO_FRICTION else friction
         self._stride = Moments()
@@ -134,10 +135,10 @@ class JointStrokes:
     def fault_of(self, stride: Moments) -> Fault | None:
         """Return a fault if this stride, or the last three, prove a wrong gain."""
         self._strides.append(stride)
-        gain = stride.gain_beyond(FACTOR_OF_ONE, self._same_fraction)
+        gain = stride.gain_beyond(FACTOR_OF_ONE, self._same_if_strong)
         if gain is None and len(self._strides) == STRIDES:
             first, second, third = self._strides
-            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE, self._same_fraction)
+            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE, self._same_if_strong)
         if gain is None:
             return None
         self._strides.clear()
