@@ -95,6 +95,14 @@ def test_a_path_goes_down_up_and_on_in_the_air() -> None:
     assert parts == [swing, swing, down, down, down, down, up, up, swing, swing, down]
 
 
+def test_an_edge_that_swings_on_after_it_came_out_begins_no_insertion() -> None:
+    motion = PathMotion()
+    for depth_m in (-0.01, 0.03, 0.02, -0.014, -0.016):
+        motion.update(depth_m, depth_m > 0.0)
+    parts = [motion.update(depth_m, False).name for depth_m in (-0.014, -0.0135, -0.014, -0.0118)]
+    assert parts == ["SWING", "SWING", "SWING", "INSERTION"]
+
+
 def test_noise_turns_no_path() -> None:
     motion = PathMotion()
     falling_m = [-0.01 + 1e-4 * i + (0.4 * TURNED_M if i % 2 else -0.4 * TURNED_M) for i in range(300)]
