@@ -41,6 +41,7 @@ from estimation.strokes.stroke_fit import (
     insertion_samples,
     level_free,
     levelling_m,
+    slide_free,
 )
 from estimation.strokes.surface import NO_SURFACE, Surface, find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
@@ -51,8 +52,8 @@ OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a st
 TWO_SURFACES = "the strokes find two surfaces"
 NO_MUD = "no evidence of mud: the torques are those of friction"
 DRAGGED = "the swing drags mud: its torque is too much of the stance's"
-# of k_p and k_e on a path whose body moves: its advance slides the plate outward, so that what sticks to its faces (in
-# clay 27 % of k_e and 46 % of k_p at 3 cm) holds it less against going up and down; at 60° half of that is lost
+# of k_p and k_e on a path whose body moves: its advance slides the plate along its edge, so that what sticks to its
+# faces (in clay 27 % of k_e and 46 % of k_p at 3 cm) holds it less; at 60° half of that is lost
 OUTWARD_UNCERTAINTY = 0.15
 HIGHEST_SURFACE = 3.0  # standard errors above the nominal height
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
@@ -281,12 +282,15 @@ class FlipperEstimator(StrideEstimator):
         stance, extraction, surface = stride.stance, stride.extraction, stride.surface
         shear = find_shear(self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n, stride.along_path)
         yield
-        k_e = yield from self._learn_extraction(stride)
+        rising = extraction.moving()
+        if stride.along_path and self.base is Base.FREE and shear.fit is not None:
+            rising = slide_free(self.geometry, rising, surface.depth_m, shear.fit.slope)
+        k_e = yield from self._learn_extraction(stride, rising)
         yield
         force_n, force_error_n = yield_force_n(self.geometry, stance.batches, shear, stride.friction_error_nm)
         self.fits = self.fits._replace(
             k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
-            k_e=partial(extraction_samples, self.geometry, extraction.moving(), surface, extraction.first_m),
+            k_e=partial(extraction_samples, self.geometry, rising, surface, extraction.first_m),
         )
         outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0
         return Learned(
@@ -313,10 +317,10 @@ class FlipperEstimator(StrideEstimator):
         """Return the middle torque of a stance, friction included."""
         return median([batch.sweep_nm + self._air.friction_nm for batch in stance]) if stance else 0.0
 
-    def _learn_extraction(self, stride: ClosingStride) -> Work[Estimate]:
+    def _learn_extraction(self, stride: ClosingStride, rising: Sequence[Batch]) -> Work[Estimate]:
         stroke, surface = stride.extraction, stride.surface
         reported = yield from fit_extraction(
-            self.geometry, stroke.moving(), surface, stride.zero.std_error_n, self._extractions, stroke.first_m
+            self.geometry, rising, surface, stride.zero.std_error_n, self._extractions, stroke.first_m
         )
         if reported.valid or not stride.is_stuck:
             return reported

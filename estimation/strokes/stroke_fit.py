@@ -10,7 +10,7 @@ the mud's force on the plate reverses from supporting it to holding it down.
 """
 
 from collections.abc import Sequence
-from math import cos, hypot, inf, isfinite, sqrt
+from math import copysign, cos, hypot, inf, isfinite, sin, sqrt
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work, finish
@@ -255,6 +255,25 @@ def evaluated(fit: OriginFit, own: float, shared: float, stroke: FittedStroke) -
 def levelling_m(surface: Surface) -> float:
     """Return the part of a surface's error that the strokes of a set-up share."""
     return sqrt(max(0.0, surface.std_error_m**2 - surface.own_error_m**2))
+
+
+def slide_free(geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, k_s: float) -> list[Batch]:
+    """Return the batches of a path with the torque on the narrow sides that a standing body would give.
+
+    A plate that its arc alone moves slides outward as it rises. The body's advance dx adds dx sin α, which is inward at
+    the rear. Where it prevails the other narrow side leads: it meets the pressure k_s ζ of a plate that is swept, and
+    pushes the flipper up instead of holding it down. Without a pose nothing is known of it.
+    """
+    freed, drop_m = list(batches[:1]), geometry.drop_m
+    for before, batch in zip(batches, batches[1:], strict=False):
+        arc_rad, side_nm = cos(batch.sweep_rad) * (batch.adduction_rad - before.adduction_rad), 0.0
+        outward_m, slide_m = drop_m * arc_rad, sin(batch.sweep_rad) * (batch.body_m - before.body_m)
+        if outward_m * (outward_m + slide_m) < 0.0:
+            depth_m = max(0.0, batch.travel_m - surface_m)
+            side_n = k_s * geometry.plate_thickness_m * depth_m**2 / 2.0
+            side_nm = copysign(2.0 * side_n * (drop_m - depth_m / 3.0) * cos(batch.sweep_rad), arc_rad)
+        freed.append(batch._replace(adduction_nm=batch.adduction_nm - side_nm))
+    return freed
 
 
 def level_free(batches: Sequence[Batch], level_nm: float) -> list[Batch]:

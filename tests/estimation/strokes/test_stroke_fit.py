@@ -30,6 +30,7 @@ from estimation.strokes.stroke_fit import (
     fit_extraction,
     fit_insertion,
     level_free,
+    slide_free,
     travels_m,
 )
 from estimation.strokes.surface import Surface
@@ -318,3 +319,31 @@ def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
     assert reported.repeatability == pytest.approx(TORQUE_REPEATABILITY * K)
     assert reported.std_error == pytest.approx(hypot(TORQUE_REPEATABILITY, CONSTANT) * K)
     assert reported.samples == 4 * SAMPLES
+
+
+@pytest.mark.parametrize(("body_m_s", "slides"), [(0.0, False), (0.1, False), (0.4, True), (nan, False)])
+def test_a_plate_that_its_body_slides_inward_is_freed_of_what_its_other_side_pushes(
+    body_m_s: float, slides: bool
+) -> None:
+    """The other side turns from resisting to pushing: twice its pressure k_s ζ on the thickness, below the arm."""
+    k_s, depths_m, turn_rad_s = 0.4e6, [0.02, 0.018, 0.016], 2.0
+    rising = [
+        Batch(
+            travel_m=depth_m,
+            sweep_rad=-FRONT_RAD,
+            adduction_rad=turn_rad_s * 0.01 * i,
+            sweep_nm=0.3,
+            adduction_nm=-0.1,
+            body_m=body_m_s * 0.01 * i,
+            saturated=False,
+            samples=SAMPLES,
+            speed_m_s=0.2,
+        )
+        for i, depth_m in enumerate(depths_m)
+    ]
+    freed = slide_free(GEOMETRY, rising, 0.0, k_s)
+    for before, after in zip(rising[1:], freed[1:], strict=True):
+        steps_m = np.linspace(0.0, before.travel_m, 1001)  # from the surface down
+        side_nm = np.trapezoid(k_s * 0.004 * steps_m * (0.05 - before.travel_m + steps_m), steps_m)
+        pushed_nm = 2.0 * cos(FRONT_RAD) * side_nm if slides else 0.0
+        assert after.adduction_nm == pytest.approx(before.adduction_nm - pushed_nm, rel=1e-3)
