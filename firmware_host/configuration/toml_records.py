@@ -247,5 +247,7 @@ def _message(error: Any) -> str:
             return f"{key} = {value}: must be at most {bounds['le']}"
         case "list_type":
             return f"{key} = {value}: must be tables, each under [[{key}]]"
+        case "model_type":
+            return f"{key} = {value}: must be a table, {{ key = value, ... }}"
         case _:
             return f"{key} = {value}: {error['msg'].removeprefix('Input ').lower()}"

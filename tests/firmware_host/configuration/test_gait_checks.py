@@ -69,6 +69,7 @@ def test_a_wrong_gait_is_refused_with_file_phase_and_key(configuration: Configur
     [
         ({"way_points": [{"sweep": 30.0, "depth_m": 0.0}]}, "phase 2.way_points 1.sweep"),
         ({"way_points": [{"sweep_deg": 30.0, "depth": 0.0}]}, "phase 2.way_points 1.depth"),
+        ({"way_points": [[30.0, 0.0]]}, "phase 2.way_points 1 = [30.0, 0.0]: must be a table"),
         ({"speed_m_s": 5.0}, "phase 2.speed_m_s = 5.0"),
         ({"name": "jump"}, "phase 2.name"),
     ],
