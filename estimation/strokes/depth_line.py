@@ -57,7 +57,8 @@ def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
     k, error = estimate.value, estimate.repeatability
     if not ((estimate.valid or estimate.at_least) and DEPTHS_M[0] <= depth_m <= DEPTHS_M[1]):
         return None
-    if not (COEFFICIENTS_N_M3[0] <= k <= COEFFICIENTS_N_M3[1] and 0.0 <= error <= k):
+    least, most = COEFFICIENTS_N_M3
+    if not (least <= k <= most and 0.0 <= error <= k and estimate.std_error <= most):
         return None
     relative = error / k
     return Reading(

@@ -4,7 +4,7 @@ from math import exp, inf, log, nan, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from control.records import Estimate, StrideEstimate
@@ -124,6 +124,7 @@ numbers = st.floats() | st.floats(1e4, 1e8)
 anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), st.just(""), st.booleans())
 
 
+@example([(0.0, Estimate(1e6, 1e162, 10, True, repeatability=1e5), 0.03)])  # its square overflows
 @given(st.lists(st.tuples(st.floats(), anything, st.floats() | st.floats(0.01, 0.06)), max_size=20))
 def test_for_any_input_the_map_contains_positive_numbers(walk: list[tuple[float, Estimate, float]]) -> None:
     mud_map = MudMap()
