@@ -18,9 +18,10 @@ u on m inflates it by the noise of m:
 A motor is too strong if the lower bound is, and too weak if the upper one is. Where the two are further apart than
 SAME_FRACTION, the strokes had too little acceleration for a verdict. A rotor with the encoder that crosses the play of
 a belt moves alone, up to three times as easily as its joint, which looks like a strong motor and scatters the sweep's
-points: r² was 0.67 at most where they gave a wrong gain, and 0.83 or more with a constant that is too large. A sweep
-that the mud lets go of is thrown through that play, so no block counts that is faster than any path. One stride proves
-a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+points: r² was 0.67 at most where ODrives gave a wrong gain, and 0.83 or more with a constant that is too large. With
+DM4310 it was up to 0.83 in both, so false alarms remain there. A sweep that the mud lets go of is thrown through that
+play, so no block counts that is faster than any path. One stride proves a gain beyond a factor of 2, three strides
+together one beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
