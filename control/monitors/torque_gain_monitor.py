@@ -72,8 +72,9 @@ class Moments(NamedTuple):
         blocks, uu, um, mm = self
         if blocks < LEAST_BLOCKS or uu < LEAST_NM2 or um <= 0.0:
             return None
-        same = um * um / (uu * mm)
-        if (um > factor * uu and same >= same_if_strong) or (factor * mm < um and same >= SAME_FRACTION):
+        um2, uu_mm = um * um, uu * mm
+        is_strong = um > factor * uu and um2 >= same_if_strong * uu_mm
+        if is_strong or (factor * mm < um and um2 >= SAME_FRACTION * uu_mm):
             gain: float = (mm / uu) ** 0.5
             return gain
         return None

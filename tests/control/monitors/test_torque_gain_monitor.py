@@ -27,6 +27,10 @@ def test_a_torque_that_stays_at_its_limit_shows_no_gain(uu: float) -> None:
     assert Moments(blocks=9, uu=uu, um=1e-17, mm=1e-18).gain_beyond(FACTOR_OF_ONE) is None
 
 
+def test_a_motion_whose_square_underflows_raises_nothing() -> None:
+    assert Moments(blocks=9, uu=1e-6, um=1e-170, mm=1e-320).gain_beyond(FACTOR_OF_ONE) == pytest.approx(0.0)
+
+
 @pytest.mark.parametrize("gain", [0.3, 3.0])
 def test_a_wrong_gain_is_returned(gain: float) -> None:
     assert Moments(9, 0.1, gain * 0.1, gain * gain * 0.1).gain_beyond(FACTOR_OF_ONE) == pytest.approx(gain)
