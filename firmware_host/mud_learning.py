@@ -91,7 +91,7 @@ class MudLearning:
         self._lowest_v = [inf] * len(configuration.rig.joints)  # since the last stride closed
 
     def _adapt_to(self, gait: GaitParameters) -> None:
-        """Choose strides of this gait from now on; what the choices share is computed before the first one."""
+        """Choose strides of this gait from now on; their candidates are computed before the first one."""
         configuration, self._gait = self._configuration, gait
         method = METHODS[configuration.adaptation.method]
         self.adaptation = method(configuration.adaptation, configuration.geometry, gait, configuration.rig)

@@ -57,7 +57,7 @@ class Adaptation(Protocol):
     def reset(self, depth_m: float) -> None: ...
 
     def prepare(self) -> Work[None]:
-        """Compute what the choices of every walk share; the first choice does it where nothing did it before."""
+        """Compute the candidates of every choice; the first choice does it where nothing did it before."""
 
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
@@ -129,8 +129,8 @@ class DepthAdaptation:
         return [(self.gait, depth_m) for depth_m in depth_grid(self.parameters, self.geometry, self.gait)]
 
     def prepare(self) -> Work[None]:
-        for gait, depth_m in self._pairs[len(self.candidates) :]:
-            self.candidates.append(make_candidate(self.geometry, gait, depth_m))
+        while len(self.candidates) < len(self._pairs):
+            self.candidates.append(make_candidate(self.geometry, *self._pairs[len(self.candidates)]))
             yield
 
     def choose(

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from control.computing.bounded_work import finish
 from control.depth.depth_choice import DepthAdaptation, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, carried_m, motion_of
@@ -272,3 +273,14 @@ class TestRange:
         grid_m = depth_grid(AdaptationParameters(min_depth_m=low_m, max_depth_m=high_m), GEOMETRY, GAIT)
         assert len(grid_m) == steps + 1
         assert grid_m[-1] <= high_m
+
+
+def test_candidates_are_computed_once_where_two_preparations_run_in_turn() -> None:
+    whole, adaptation = adapted(), adapted()
+    finish(whole.prepare())
+    first, second = adaptation.prepare(), adaptation.prepare()
+    next(first)
+    next(second)
+    finish(first)
+    finish(second)
+    assert adaptation.candidates == whole.candidates
