@@ -30,6 +30,17 @@ class Gap(NamedTuple):
         return JointTarget(angle_rad, rate_rad / self.duration_s)
 
 
+def with_gaps(targets: JointTargets, gaps: Sequence[Gap], time_s: float) -> JointTargets:
+    """Return the targets plus what is left of their gaps."""
+    rests = [gap.after(time_s) for gap in gaps]
+    return Joints(
+        *(
+            JointTarget(target.angle_rad + rest.angle_rad, target.velocity_rad_s + rest.velocity_rad_s)
+            for target, rest in zip(targets, rests, strict=True)
+        )
+    )
+
+
 class JointPath:
     """All joints of a leg start and arrive together; the joint with the longest path sets the duration."""
 
@@ -69,17 +80,7 @@ class JointPath:
                 for from_rad, to_rad in zip(start, end, strict=True)
             )
         )
-        return self._with_gaps(targets) if self._gaps and not self._leg else targets
-
-    def _with_gaps(self, targets: JointTargets) -> JointTargets:
-        """Add what is left of the velocities with which the joints began."""
-        rests = [gap.after(self._time_s) for gap in self._gaps]
-        return Joints(
-            *(
-                JointTarget(target.angle_rad + rest.angle_rad, target.velocity_rad_s + rest.velocity_rad_s)
-                for target, rest in zip(targets, rests, strict=True)
-            )
-        )
+        return with_gaps(targets, self._gaps, self._time_s) if self._gaps and not self._leg else targets
 
 
 def still(angles: JointAngles) -> JointTargets:

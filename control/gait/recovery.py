@@ -28,7 +28,7 @@ from collections.abc import Sequence
 from math import copysign, cos, fsum, radians, sin
 
 from control.gait.gait import RAMP_S
-from control.gait.joint_path import Gap, still
+from control.gait.joint_path import Gap, still, with_gaps
 from control.gait.stride_table import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange, clip
@@ -185,15 +185,11 @@ class Recovery:
         """Return the gait's targets plus the rest of the gaps."""
         if not self._gaps:
             return wanted
-        rests = [gap.after(self._time_s) for gap in self._gaps]
+        faded = with_gaps(wanted, self._gaps, self._time_s)
         if self._time_s >= max(self._fade_s):
             self._gaps = ()
-        return Joints(
-            *(
-                JointTarget(clip(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
-                for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
-            )
-        )
+        spans = zip(faded, self._ranges, strict=True)
+        return Joints(*(target._replace(angle_rad=clip(target.angle_rad, *span)) for target, span in spans))
 
 
 def _are_stuck(flippers: Sequence[str]) -> str:
