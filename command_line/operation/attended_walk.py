@@ -24,7 +24,7 @@ POLL_S = 0.03  # for strides that have closed, from which a law orders the next 
 MOVING = ("walking", "stopping", "damping")
 
 
-Law = Callable[[StatusClient, dict[str, Any]], None]  # acts on the status
+LawStep = Callable[[StatusClient, dict[str, Any]], None]  # asks the law, and gives its order
 
 
 class LawError(CommandError):
@@ -34,13 +34,13 @@ class LawError(CommandError):
         super().__init__(message, status=exit_codes.REFUSED)
 
 
-def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: Law | None = None) -> Answer:
+def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: LawStep | None = None) -> Answer:
     """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     return _attend(client, as_json, partial(_renew, client, as_json, law))
 
 
-def attend_pose(client: StatusClient, law: Law, period_s: float) -> Answer:
+def attend_pose(client: StatusClient, law: LawStep, period_s: float) -> Answer:
     """Let a law move the joints while the robot holds its pose under a lease of this client."""
     return _attend(client, True, partial(_renew, client, True, law, ("hold",), period_s))
 
@@ -65,7 +65,7 @@ def _attend(client: StatusClient, as_json: bool, renew: Callable[[], object]) ->
 def _renew(
     client: StatusClient,
     as_json: bool,
-    law: Law | None = None,
+    law: LawStep | None = None,
     modes: Sequence[str] = MOVING,
     period_s: float = 0.0,
 ) -> dict[str, Any]:

@@ -95,8 +95,9 @@ def walk(gait: str, strength_pa: float, seed: int, depth_m: float, strides: int)
 def setup_of(gait: str, depth_m: float) -> Setup:
     path = read_gait(gait_document(gait))
     parameters = crutching_parameters(path)
-    setup = replace(WALKING, depth_m=depth_m, path=path)
-    return replace(setup, path=None, gait=parameters) if parameters else setup
+    if parameters:
+        return replace(WALKING, depth_m=depth_m, gait=parameters)
+    return replace(WALKING, depth_m=depth_m, path=path)
 
 
 def _strokes_of(stride: StrideEstimate, met: StrideTruth, geometry: FlipperGeometry) -> StrideTruth:
