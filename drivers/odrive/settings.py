@@ -80,11 +80,6 @@ class DriveSettings:
         return True
 
     @property
-    def identified(self) -> bool:
-        """Return whether the serial number is known, or none is expected."""
-        return bool(self.serial_number) or not self.expected_serial_number
-
-    @property
     def _reports_serial_number(self) -> bool:
         return self.supported and self.version is not None and self.version >= codec.FIRST_WITH_ADDRESS
 
