@@ -8,26 +8,40 @@ import pytest
 
 from control.geometry import FlipperGeometry
 from control.records import UNKNOWN, Estimate
-from estimation.ground_law import ACROSS, DOWN, LAWS, UNDECIDED, UP, law_evidence, readings_of
+from estimation.ground_law import (
+    ACROSS,
+    DOWN,
+    EDGE_DOWN,
+    FACE_ACROSS,
+    LAWS,
+    UNDECIDED,
+    UP,
+    law_evidence,
+    readings_of,
+)
+from simulation.mud.grounds.sand import Sand
 
 GEOMETRY = FlipperGeometry()
 STRENGTHS = {"mud": 2000.0, "sand": 1.8e6}  # Pa; N/m³
 DEPTHS_M = {"k_p": 0.029, "k_s": 0.030, "k_e": 0.022}
 
 
-def readings(law: str, depth: float = 1.0) -> dict[str, tuple[float, float]]:
+FORMS = [(law, form) for law, forms in LAWS.items() for form in range(len(forms))]
+
+
+def readings(law: str, depth: float = 1.0, form: int = 0) -> dict[str, tuple[float, float]]:
     """Return the coefficients of a ground by its law."""
     found = {}
     for name, depth_m in DEPTHS_M.items():
-        unit = LAWS[law](name, GEOMETRY.plate_width_m, GEOMETRY.plate_thickness_m, depth * depth_m)
+        unit = LAWS[law][form](name, GEOMETRY.plate_width_m, GEOMETRY.plate_thickness_m, depth * depth_m)
         found[name] = (STRENGTHS[law] * unit, depth * depth_m)
     return found
 
 
 @pytest.mark.parametrize("depth", [0.5, 1.0, 1.6])
-@pytest.mark.parametrize("law", LAWS)
-def test_a_ground_that_keeps_a_law_is_named_at_any_depth(law: str, depth: float) -> None:
-    evidence = law_evidence(GEOMETRY, readings(law, depth))
+@pytest.mark.parametrize(("law", "form"), FORMS)
+def test_a_ground_that_keeps_a_law_is_named_at_any_depth(law: str, form: int, depth: float) -> None:
+    evidence = law_evidence(GEOMETRY, readings(law, depth, form))
     assert evidence is not None
     assert evidence.name == law
     assert evidence.errors[law] == pytest.approx(0.0, abs=1e-9)
@@ -36,8 +50,8 @@ def test_a_ground_that_keeps_a_law_is_named_at_any_depth(law: str, depth: float)
 def test_grounds_that_differ_from_their_law_are_seldom_named_wrong() -> None:
     random, named = Random(1), dict.fromkeys((*LAWS, UNDECIDED, "wrong"), 0)
     for number in range(400):
-        law = "mud" if number % 2 else "sand"
-        scattered = {name: (k * exp(random.gauss(0.0, 0.3)), z) for name, (k, z) in readings(law).items()}
+        law, form = FORMS[number % len(FORMS)]
+        scattered = {name: (k * exp(random.gauss(0.0, 0.3)), z) for name, (k, z) in readings(law, form=form).items()}
         evidence = law_evidence(GEOMETRY, scattered)
         assert evidence is not None
         named[evidence.name if evidence.name in (law, UNDECIDED) else "wrong"] += 1
@@ -88,3 +102,9 @@ def test_the_constants_of_sand_are_those_of_the_published_map() -> None:
     assert pytest.approx(a00 - a10 + b01 - b11 - b_11, abs=1e-9) == DOWN  # tilt and direction of π/2
     assert pytest.approx(-(a00 - a10 - b01 + b11 + b_11), abs=1e-9) == UP
     assert pytest.approx(c01 - c11 - c_11, abs=1e-9) == ACROSS
+
+
+def test_the_constants_of_sands_surfaces_are_those_of_the_published_map() -> None:
+    sand, up = Sand("sand", 1.0, spatial=True), (0.0, 0.0, 1.0)
+    assert sand.resistance((0.0, 0.0, -1.0), up, (0.0, 0.0, -1.0))[2] == pytest.approx(-EDGE_DOWN, abs=1e-9)
+    assert sand.resistance((1.0, 0.0, 0.0), up, (1.0, 0.0, 0.0))[0] == pytest.approx(FACE_ACROSS, abs=5e-4)

@@ -4,10 +4,16 @@ from typing import Any
 
 import pytest
 
+from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
+from control.modes import Mode
+from estimation.ground_law import law_of_strides
+from experiments.robot.lockstep_robot import start_walk
 from experiments.studies.grounds import GROUNDS, disturbances_on, study
 from experiments.trackway.walk import Walk, WalkedStride
+from experiments.trials.trial import WALKING, configuration_of
 from simulation.mud.disturbances import TRACKWAY
+from simulation.mud.track import Track
 from simulation.test_rig.load_cell import LoadCell
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
@@ -50,3 +56,17 @@ def test_the_study_compares_the_choice_with_the_best_constant_depth_and_counts_i
     assert errors[["coverage", "strides"]].drop_duplicates().to_numpy().tolist() == [[0.5, 2]]
     assert pooled["strides"].tolist() == [4]
     result.figures[0].draw()
+
+
+@pytest.mark.parametrize(
+    ("ground", "law"), [("clay-1.4", "mud"), ("thixotropic", "mud"), ("sand-generic", "sand"), ("sand-spatial", "sand")]
+)
+def test_five_strides_name_the_law_of_a_ground(ground: str, law: str) -> None:
+    configuration, on = configuration_of(WALKING), disturbances_on(GROUNDS[ground], TRACKWAY)
+    track = Track([(100.0, GROUNDS[ground])])
+    robot = start_walk(configuration, track, 1, WalkOrder(0.03, adaptive=True, strides=5), disturbances=on)
+    while robot.loop.mode is Mode.WALKING:
+        robot.step()
+    strides = [closed.estimate for closed in robot.loop.learning.strides]
+    evidence = law_of_strides(configuration.geometry, strides)
+    assert evidence is not None and evidence.name == law
