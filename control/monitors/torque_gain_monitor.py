@@ -17,11 +17,11 @@ u on m inflates it by the noise of m:
 
 A motor is too strong if the lower bound is, and too weak if the upper one is. Where the two are further apart than
 SAME_FRACTION, the strokes had too little acceleration for a verdict. A rotor with the encoder that crosses the play of
-a belt moves alone, up to three times as easily as its joint, which looks like a strong motor and scatters the sweep's
-points: r² was 0.67 at most where ODrives gave a wrong gain, and 0.83 or more with a constant that is too large. With
-DM4310 it was up to 0.83 in both, so false alarms remain there. A sweep that the mud lets go of is thrown through that
-play, so no block counts that is faster than any path. One stride proves a gain beyond a factor of 2, three strides
-together one beyond 1.6. [arm] states the inertias, which must be as exact.
+a belt moves alone, up to three times as easily as its joint, and then hits it: after both, the torque has moved the
+whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
+cross 1 degree. A sweep that the mud lets go of is thrown through that play, so no block counts that is faster than any
+path. One stride proves a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the inertias,
+which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -46,9 +46,12 @@ FAST_RAD_S = 10.0  # of a joint that the mud has let go: faster than its path
 LEAST_BLOCKS = 7  # of a phase
 LEAST_NM2 = 1e-6  # of Σ u² about the mean: a torque at its limit varies by the rounding of floats
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
-SAME_IN_SWING = 0.75  # of a strong motor: more than with a rotor that crosses the play of its belt
+JOINED_BLOCKS = 3  # of a sweep, to one in which a rotor crosses the play of its belt and hits the other side
 FACTOR_OF_ONE, FACTOR_OF_THREE = 2.0, 1.6
 STRIDES = 3
+
+
+Block = tuple[float, float]  # commanded torque u, and torque m of the motion
 
 
 class Moments(NamedTuple):
@@ -59,6 +62,14 @@ class Moments(NamedTuple):
     um: float = 0.0
     mm: float = 0.0
 
+    @classmethod
+    def of(cls, blocks: Sequence[Block]) -> "Moments":
+        """Return those of a stroke."""
+        u, m = map(sum, zip(*blocks, strict=True))
+        n = len(blocks)
+        about = [(a - u / n, b - m / n) for a, b in blocks]
+        return cls(n, sum(a * a for a, _ in about), sum(a * b for a, b in about), sum(b * b for _, b in about))
+
     def plus(self, other: "Moments") -> "Moments":
         return Moments(self.blocks + other.blocks, self.uu + other.uu, self.um + other.um, self.mm + other.mm)
 
@@ -67,34 +78,46 @@ class Moments(NamedTuple):
         """Return whether the torques have few causes but the motion: in mud, a lower bound of the gain near zero."""
         return self.blocks >= LEAST_BLOCKS and FACTOR_OF_THREE * self.um > self.uu
 
-    def gain_beyond(self, factor: float, same_if_strong: float = SAME_FRACTION) -> float | None:
-        """Return the gain, if it is certainly beyond this factor or its inverse."""
+    @property
+    def is_line(self) -> bool:
+        """Return whether one gain explains the motion."""
         blocks, uu, um, mm = self
-        if blocks < LEAST_BLOCKS or uu < LEAST_NM2 or um <= 0.0:
-            return None
-        um2, uu_mm = um * um, uu * mm
-        is_strong = um > factor * uu and um2 >= same_if_strong * uu_mm
-        if is_strong or (factor * mm < um and um2 >= SAME_FRACTION * uu_mm):
-            gain: float = (mm / uu) ** 0.5
-            return gain
-        return None
+        return blocks >= LEAST_BLOCKS and uu >= LEAST_NM2 and um > 0.0 and um * um >= SAME_FRACTION * uu * mm
+
+    @property
+    def gain(self) -> float:
+        gain: float = (self.mm / self.uu) ** 0.5
+        return gain
+
+
+class Stride(NamedTuple):
+    """The moments of a stride's blocks, and of its joined blocks, which a rotor in its play does not change."""
+
+    blocks: Moments = Moments()
+    joined: Moments = Moments()
+
+    def plus(self, other: "Stride") -> "Stride":
+        return Stride(self.blocks.plus(other.blocks), self.joined.plus(other.joined))
+
+    def gain_beyond(self, factor: float) -> float | None:
+        """Return the gain, if it is certainly beyond this factor or its inverse."""
+        blocks, joined = self
+        if joined.is_line and joined.um > factor * joined.uu:
+            return joined.gain
+        return blocks.gain if blocks.is_line and factor * blocks.mm < blocks.um else None
 
 
 class JointStrokes:
     """Owns the sums of one joint: of the stroke under way, of the stride under way, and of the last strides."""
 
-    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction, same_if_strong: float) -> None:
+    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction, joins: int) -> None:
         self.joint = joint
-        self._same_if_strong = same_if_strong
         self.inertia_kg_m2 = inertia_kg_m2
         self.friction = None if friction == NO_FRICTION else friction
-        self._stride = Moments()
-        self._strides: deque[Moments] = deque(maxlen=STRIDES)
-        self._begin_stroke()
-
-    def _begin_stroke(self) -> None:
-        self._blocks = 0
-        self._u = self._m = self._uu = self._um = self._mm = 0.0
+        self._joins = joins
+        self._stroke: list[Block] = []
+        self._stride = Stride()
+        self._strides: deque[Stride] = deque(maxlen=STRIDES)
 
     def add(self, before: DriveState, state: DriveState, torque_nm: float, gravity_nm: float) -> None:
         """Add a block between two states in air; one that is slow or turns ends the stroke."""
@@ -107,40 +130,35 @@ class JointStrokes:
             self.end_stroke()
             return
         if max(abs(first_rad_s), abs(last_rad_s)) > FAST_RAD_S:
-            self._begin_stroke()
+            self._stroke.clear()
             return
         if elapsed_s <= 0.0:
             return
         moving_nm = self.inertia_kg_m2 * (last_rad_s - first_rad_s) / elapsed_s - gravity_nm
         if self.friction is not None:
             moving_nm += self.friction.torque_nm(state.angle_rad, (first_rad_s + last_rad_s) / 2.0)
-        self._blocks += 1
-        self._u += torque_nm
-        self._m += moving_nm
-        self._uu += torque_nm * torque_nm
-        self._um += torque_nm * moving_nm
-        self._mm += moving_nm * moving_nm
+        self._stroke.append((torque_nm, moving_nm))
 
     def end_stroke(self) -> None:
-        blocks, u, m = self._blocks, self._u, self._m
-        if blocks > 1:
-            stroke = Moments(blocks, self._uu - u * u / blocks, self._um - u * m / blocks, self._mm - m * m / blocks)
-            self._stride = self._stride.plus(stroke)
-        if blocks:
-            self._begin_stroke()
+        blocks, joins = self._stroke, self._joins
+        if len(blocks) > joins:
+            rows = zip(*[iter(blocks)] * joins, strict=False)
+            joined = [(sum(u for u, _ in row) / joins, sum(m for _, m in row) / joins) for row in rows]
+            self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined)))
+        blocks.clear()
 
-    def end_stride(self) -> Moments:
-        """Return the sums of the stride, and begin the next one."""
-        stride, self._stride = self._stride, Moments()
+    def end_stride(self) -> Stride:
+        """Return the moments of the stride, and begin the next one."""
+        stride, self._stride = self._stride, Stride()
         return stride
 
-    def fault_of(self, stride: Moments) -> Fault | None:
+    def fault_of(self, stride: Stride) -> Fault | None:
         """Return a fault if this stride, or the last three, prove a wrong gain."""
         self._strides.append(stride)
-        gain = stride.gain_beyond(FACTOR_OF_ONE, self._same_if_strong)
+        gain = stride.gain_beyond(FACTOR_OF_ONE)
         if gain is None and len(self._strides) == STRIDES:
             first, second, third = self._strides
-            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE, self._same_if_strong)
+            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE)
         if gain is None:
             return None
         self._strides.clear()
@@ -164,8 +182,7 @@ class FlipperStrokes:
         self._geometry, self._mass = geometry, mass
         self._commands = slice(0, BLOCK_TICKS) if asked else slice(1, BLOCK_TICKS + 1)
         inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
-        same = (SAME_IN_SWING, SAME_FRACTION)
-        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, same)
+        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, (JOINED_BLOCKS, 1))
         self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
         self._joint: JointStrokes | None = None  # that this phase watches
         self._swung_in_air = False
@@ -203,7 +220,7 @@ class FlipperStrokes:
         stride = joint.end_stride()
         fault = joint.fault_of(stride) if joint is self._sweep or self._swung_in_air else None
         if joint is self._sweep:
-            self._swung_in_air = stride.in_air
+            self._swung_in_air = stride.blocks.in_air
         if fault:
             found.append(fault)
 
