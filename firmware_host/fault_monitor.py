@@ -3,7 +3,7 @@
 It only detects. The latch decides how long a fault is present, and the modes decide how the robot reacts.
 """
 
-from math import copysign, isnan
+from math import isnan
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -12,7 +12,6 @@ from control.joint_friction import NO_FRICTION
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
-from control.monitors.motion_monitor import PROBE_NM
 from control.monitors.torque_gain_monitor import FlipperStrokes, TorqueGainMonitor
 from control.monitors.zero_monitor import ZeroMonitor
 from control.rate import PERIOD_S
@@ -118,19 +117,13 @@ class FaultMonitor:
         )
 
     def with_probes(self, wanted: Torques, largest_nm: float) -> Torques:
-        """Return the wanted torques; of a joint that is probed less, also than the largest one."""
+        """Return the wanted torques; with a step for each joint that is probed."""
         for joint in self.joints:
-            if joint.motion.probed:
+            if joint.probed:
                 break
         else:
             return wanted
-        less_nm = [PROBE_NM if joint.motion.probed else 0.0 for joint in self.joints]
-        return Joints(
-            *(
-                copysign(max(min(abs(torque_nm), largest_nm) - nm, 0.0), torque_nm) if nm else torque_nm
-                for nm, torque_nm in zip(less_nm, wanted, strict=True)
-            )
-        )
+        return Joints(*(joint.probe(nm, largest_nm) for joint, nm in zip(self.joints, wanted, strict=True)))
 
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         """Return all faults of this tick."""

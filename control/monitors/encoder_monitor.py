@@ -5,7 +5,9 @@ must follow the integral of the velocity. A slipping magnet or a broken cable vi
 sensor the second: on a wrong angle the position loop would drive the joint to its stop at full torque. A sensor that
 freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit.
 One that freezes at exactly zero velocity shows in the torque: every joint yields a little to a torque that changes, by
-half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the arm in the stiffest mud.
+half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the arm in the stiffest mud. Where the body
+moves, the load of a joint that dry friction holds may follow a torque that changes slowly, by 0.9 N·m in 0.1 s. It does
+not follow a step, so such a joint is probed by one before it counts as frozen.
 """
 
 from math import degrees, inf
@@ -22,6 +24,7 @@ RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
 YIELDING_NM = 0.4  # change of the torque meanwhile: more than dry friction and shakes of the bench (±0.15 N·m)
+STEP_NM = 0.25  # more than dry friction holds in both directions
 YIELDS_S = 0.01  # after that: an answer is a tick older than its torque, and ten times the inertia starts in 3 ms
 
 
@@ -59,6 +62,11 @@ class EncoderMonitor:
         self.forget_torque()
         self._speed.reset()
         self._begin_interval()
+
+    @property
+    def probed(self) -> bool:
+        """Return whether the joint is to get a step of STEP_NM, since it has ignored a torque that changed."""
+        return self._unchanged_s > UNCHANGED_S - YIELDS_S and self._highest_nm - self._lowest_nm > YIELDING_NM
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""

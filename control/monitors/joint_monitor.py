@@ -4,13 +4,13 @@
 a single sample cannot show. Bounds that depend on the machine are in FaultBounds, all others are constants here.
 """
 
-from math import degrees, isfinite, radians
+from math import copysign, degrees, isfinite, radians
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
 from control.limits import JointRange
-from control.monitors.encoder_monitor import EncoderMonitor
-from control.monitors.motion_monitor import JointDynamics, MotionMonitor
+from control.monitors.encoder_monitor import STEP_NM, EncoderMonitor
+from control.monitors.motion_monitor import PROBE_NM, JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding
 from control.parameters.fault_bounds import FaultBounds
@@ -114,6 +114,17 @@ class JointMonitor:
         self._watch_load(found, facts, facts.dt_s, state.current_a, torque_nm)
         self._watch_heat(found, facts, state, torque_nm)
         return found
+
+    @property
+    def probed(self) -> bool:
+        return self.motion.probed or self._encoder.probed
+
+    def probe(self, torque_nm: float, largest_nm: float) -> float:
+        """Return the wanted torque, or that of a probe: without motion or its load, the joint has a fault."""
+        limited_nm, sign = min(abs(torque_nm), largest_nm), copysign(1.0, torque_nm)
+        if self._encoder.probed:
+            return sign * max(limited_nm - STEP_NM, -largest_nm)
+        return sign * max(limited_nm - PROBE_NM, 0.0) if self.motion.probed else torque_nm
 
     def _fault(self, kind: FaultKind, **values: float | str) -> Fault:
         return kind.fault(self.joint, **values)

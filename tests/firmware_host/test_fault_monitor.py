@@ -272,6 +272,19 @@ def test_only_a_joint_that_is_probed_gets_less_than_the_wanted_torque(bench: Ben
     assert bench.monitor.with_probes(wanted, 0.75) == (0.3, -0.625, 0.175, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("wanted_nm", "largest_nm", "expected_nm"),
+    [(0.5, 0.75, 0.25), (-0.1, 0.75, 0.15), (2.0, 0.75, 0.5), (0.0, 0.2, -0.2)],
+)
+def test_a_joint_that_ignores_a_change_of_its_torque_gets_a_step(
+    bench: Bench, wanted_nm: float, largest_nm: float, expected_nm: float
+) -> None:
+    for tick in range(18):
+        bench.tick(sent=LimitedTorques(Joints(0.0, 0.5 if tick > 9 else 0.0, 0.0, 0.0), False, True))
+    probed = bench.monitor.with_probes(Joints(*[wanted_nm] * 4), largest_nm)
+    assert probed == pytest.approx((wanted_nm, expected_nm, wanted_nm, wanted_nm))
+
+
 def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: Bench) -> None:
     full = LimitedTorques(Joints(0.75, 0.0, 0.0, 0.0), False, True)
 

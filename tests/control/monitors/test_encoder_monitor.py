@@ -153,6 +153,19 @@ def test_a_resting_joint_yields_to_a_torque_that_changes(
     assert first_stuck(found(samples, torques_nm=torques_nm)) == expected
 
 
+@pytest.mark.parametrize(("yields", "names"), [(True, {""}), (False, {"", "encoder_stuck"})])
+def test_a_joint_whose_load_follows_its_torque_must_yield_to_a_step(yields: bool, names: set[str]) -> None:
+    """Dry friction holds the joint of a body that moves; measured in a simulated walk: 0.9 N·m in 0.1 s."""
+    encoder, angle_rad, reported, probes = make_encoder(), 0.3, set(), 0
+    for number in range(500):
+        torque_nm = 0.45 * sin(9.0 * number * MESSAGE_S)
+        if encoder.probed:
+            probes += 1
+            angle_rad += COUNT_RAD * yields
+        reported |= set(found([(number * MESSAGE_S, angle_rad, 0.0)], encoder, [torque_nm]))
+    assert reported == names and probes
+
+
 def test_a_velocity_that_changes_begins_the_wait_for_a_torque_again() -> None:
     samples = [(0.02 * number, 0.3, 1e-12 * (number // 3 % 2)) for number in range(400)]  # each is repeated twice
     assert not any(found(samples, torques_nm=[0.7, 0.0] * 200))
