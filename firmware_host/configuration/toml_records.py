@@ -111,14 +111,15 @@ class RecordReader:
         try:
             return dict(self._model.model_validate(document))
         except ValidationError as problem:
-            raise ConfigurationError([self._message(error) for error in problem.errors()]) from problem
+            raise ConfigurationError([self._message(error, document) for error in problem.errors()]) from problem
 
-    def _message(self, error: Any) -> str:
+    def _message(self, error: Any, document: Any) -> str:
+        key = _key(error["loc"], document)
         if error["type"] != "extra_forbidden":
-            return _message(error)
+            return _message(key, error)
         *path, name = error["loc"]
         similar = similar_name(str(name), _keys_at(self._model, path))
-        return f"{_key(error['loc'])}: there is no such key{f'; did you mean {similar}?' if similar else ''}"
+        return f"{key}: there is no such key{f'; did you mean {similar}?' if similar else ''}"
 
 
 def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any] | None = None) -> type[BaseModel]:
@@ -217,12 +218,17 @@ def _given_fields(checked: BaseModel) -> dict[str, Any]:
     return {name: value for name, value in checked if name in checked.model_fields_set}
 
 
-def _key(location: tuple[str | int, ...]) -> str:
-    """`limits.torque_nm`, `segment 2.layer 1.factor`."""
+def _key(location: tuple[str | int, ...], document: Any) -> str:
+    """`limits.torque_nm`, `segment 2.layer 1.factor`, `phase 1 (insertion).speed_m_s` where a table has a name."""
     key = ""
     for part in location:
-        if not (isinstance(part, str) and part.startswith("<")):  # the tag of one of several records
-            key += f" {part + 1}" if isinstance(part, int) else f".{part}" if key else part
+        if isinstance(part, int):
+            document = document[part]
+            name = document.get("name") if isinstance(document, dict) else None
+            key += f" {part + 1}" + (f" ({name})" if isinstance(name, str) else "")
+        elif not part.startswith("<"):  # the tag of one of several records
+            document = document.get(part) if isinstance(document, Mapping) else None
+            key += f".{part}" if key else part
     return key
 
 
@@ -234,9 +240,9 @@ def shown(value: Any) -> str:
         return "beyond all size"
 
 
-def _message(error: Any) -> str:
+def _message(key: str, error: Any) -> str:
     """`limits.torque_nm = 9.0: must be at most 5.0`."""
-    key, value = _key(error["loc"]), shown(error["input"])
+    value = shown(error["input"])
     bounds = error.get("ctx", {})
     match error["type"]:
         case "missing":

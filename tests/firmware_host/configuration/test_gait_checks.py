@@ -67,11 +67,11 @@ def test_a_wrong_gait_is_refused_with_file_phase_and_key(configuration: Configur
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        ({"way_points": [{"sweep": 30.0, "depth_m": 0.0}]}, "phase 2.way_points 1.sweep"),
-        ({"way_points": [{"sweep_deg": 30.0, "depth": 0.0}]}, "phase 2.way_points 1.depth"),
-        ({"way_points": [[30.0, 0.0]]}, "phase 2.way_points 1 = [30.0, 0.0]: must be a table"),
-        ({"speed_m_s": 5.0}, "phase 2.speed_m_s = 5.0"),
-        ({"name": "jump"}, "phase 2.name"),
+        ({"way_points": [{"sweep": 30.0, "depth_m": 0.0}]}, "phase 2 (stance).way_points 1.sweep"),
+        ({"way_points": [{"sweep_deg": 30.0, "depth": 0.0}]}, "phase 2 (stance).way_points 1.depth"),
+        ({"way_points": [[30.0, 0.0]]}, "phase 2 (stance).way_points 1 = [30.0, 0.0]: must be a table"),
+        ({"speed_m_s": 5.0}, "phase 2 (stance).speed_m_s = 5.0"),
+        ({"name": "jump"}, "phase 2 (jump).name"),
     ],
 )
 def test_a_key_without_its_unit_or_out_of_bounds_is_named(changes: dict[str, Any], key: str) -> None:
