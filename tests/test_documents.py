@@ -36,13 +36,16 @@ def test_every_generated_table_has_lines_and_the_configuration_all_keys() -> Non
     assert all(f"| `{key.name}` |" in texts["configuration"] for key in configuration_keys())
 
 
+NEEDED = {"safety": {"motion": {"longest_hold_s": 1800.0}}}  # by an example: the bound for which it gives a reason
+
+
 def test_each_example_of_a_section_is_accepted_by_the_daemon() -> None:
     whole = tomllib.loads(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8"))
     texts = re.findall(r"```toml\n(.*?)\n```", "\n".join(sections()), re.DOTALL)
     names = dict.fromkeys(key.section for key in configuration_keys())
     examples = dict(zip(names, map(tomllib.loads, texts), strict=True))
     for name, example in examples.items():
-        copied = _merged(whole, example)
+        copied = _merged(whole, _merged(example, NEEDED.get(name, {})))
         for each in examples:
             if each.startswith(f"{name}."):  # [pose] needs [pose.natnet]
                 copied = _merged(copied, examples[each])

@@ -52,14 +52,13 @@ def gaits() -> Iterator[str]:
 
 def example(section: str, keys: Sequence[Key]) -> str:
     """Return a section to copy: of the example configuration, where it may be a comment, or one with every default."""
-    begin = f"[{section}".replace("NAME", "") if section.endswith(".NAME") else f"[{section}]"
+    head = re.compile(re.escape(f"[{section}]").replace("NAME", r"\w+"))
     text = EXAMPLE.read_text(encoding="utf-8")
     for part in (*SECTION.split(text), *SECTION.split(COMMENTED.sub("", text))):
-        if part.startswith(begin):
+        if head.match(part):
             return COMMENTS_OF_NEXT.sub("", part).strip()
     known = [key for key in keys if key.default is not MISSING and isinstance(key.default, TOML_VALUES)]
-    head = f"[{section}]".replace("NAME", "left_sweep")
-    return "\n".join([head, *(f"{key.name} = {toml_value(key.default)}" for key in known)])
+    return "\n".join([f"[{section}]", *(f"{key.name} = {toml_value(key.default)}" for key in known)])
 
 
 def _key_row(key: Key) -> tuple[str, str, str, str, str]:
