@@ -5,9 +5,10 @@ interleaved run a bare interpreter took 32 ms, with argparse 56 ms, with typer 1
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from command_line.errors import usage_error
 from command_line.json_output import JSON, Answer
 from experiments.study.option import REQUIRED, DeclaredOption, Option, declared_options
 
@@ -37,6 +38,16 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
         parser.add_argument(JSON, action="store_true", help="print JSON for programs")
 
 
+class StoreOnce(argparse.Action):
+    """Refuses a second value, which would replace the first one in silence."""
+
+    def __call__(self, _: object, options: argparse.Namespace, value: Any, __: object = None) -> None:
+        first = getattr(options, self.dest, self.default)
+        if first is not self.default:
+            raise argparse.ArgumentError(self, f"is given twice, as {first} and {value}; give it once")
+        setattr(options, self.dest, value)
+
+
 def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
     """Return the values that the operator gave to parameters of the function, and computed defaults."""
     given = {}
@@ -45,7 +56,16 @@ def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> 
         if value is not None:
             value = default() if default and value is default else value
             given[each.parameter] = tuple(value) if isinstance(value, list) else value
+        if value and each.option.keyed:
+            _refuse_repeated_key(value)
     return given
+
+
+def _refuse_repeated_key(pairs: Sequence[tuple[str, Any]]) -> None:
+    keys = [key for key, _ in pairs]
+    if twice := next((key for key in keys if keys.count(key) > 1), ""):
+        values = " and ".join(str(value) for key, value in pairs if key == twice)
+        raise usage_error(f"{twice} is given twice, as {values}; give it once")
 
 
 def flag_of(parameter: str) -> str:
@@ -68,8 +88,7 @@ def _keywords(declared: DeclaredOption) -> dict[str, Any]:
         at_least_none, at_least_one = ("*", "+") if declared.repeatable else ("?", None)
         # argparse would parse a default of text, SUPPRESS too
         return keywords | {"nargs": at_least_one if is_required else at_least_none, "default": None}
-    if declared.repeatable:
-        keywords["action"] = "append"
+    keywords["action"] = "append" if declared.repeatable else StoreOnce
     if option.without_value is not None:
         keywords |= {"nargs": "?", "const": option.without_value}
     return keywords | {"required": is_required}

@@ -52,13 +52,14 @@ def geometry_value(text: str) -> tuple[str, float]:
 
 
 NodeIds = Annotated[
-    tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id, offers="{joint}=")
+    tuple[tuple[str, int], ...],
+    Option("right_sweep=3", metavar="JOINT=ID", parse=node_id, keyed=True, offers="{joint}="),
 ]
 PlateFile = Annotated[
     str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
 ]
 GeometryValues = Annotated[
-    tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value)
+    tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value, keyed=True)
 ]
 
 

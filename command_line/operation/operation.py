@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.errors import CommandError, usage_error
+from command_line.errors import CommandError
 from command_line.json_output import Answer
 from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
@@ -113,16 +113,13 @@ def joint_angle(text: str) -> tuple[str, float]:
 def move(
     angles: Annotated[
         tuple[tuple[str, float], ...],
-        Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle, offers="{joint}="),
+        Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle, keyed=True, offers="{joint}="),
     ],
     *,
     socket: Socket,
     take_over: TakeOver = False,
 ) -> Answer:
     """Wait until the joints have arrived; Ctrl-C stops them."""
-    joints = [joint for joint, _ in angles]
-    if twice := next((joint for joint in joints if joints.count(joint) > 1), None):
-        raise usage_error(f"{twice} is named twice")
     with StatusClient(socket) as client:
         try:
             angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in angles}

@@ -21,7 +21,8 @@ def key_value(text: str) -> tuple[str, str]:
 
 
 KeyValues = Annotated[
-    tuple[tuple[str, str], ...], Option("mud=A water=49.5 ...; KEY= removes one", metavar="KEY=VALUE", parse=key_value)
+    tuple[tuple[str, str], ...],
+    Option("mud=A water=49.5 ...; KEY= removes one", metavar="KEY=VALUE", parse=key_value, keyed=True),
 ]
 
 

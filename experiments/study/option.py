@@ -29,6 +29,7 @@ class Option(NamedTuple):
     unit: str = ""
     metavar: str = ""
     also: str = ""  # a second name, such as "--seeds"
+    keyed: bool = False  # each value of a tuple is a key and its value, and a key counts once
     joined: bool = False  # one text has all values of a tuple, such as A,B
     parse: Callable[[str], Any] | None = None  # the text of a value, or of all joined ones; raises OptionError
     above: float = -inf  # a lower bound that is not allowed itself
