@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.actuator.fit import JointFit
-from experiments.reports.style import FAINT, FORWARD, INK
+from experiments.reports.style import BODY, FAINT, FORWARD, INK, WIDTH_IN
 from experiments.reports.value_text import value_text
 
-HEIGHT_IN, WIDTH_IN, COLUMNS = 4.2, 5.0, 2  # two next to each other are as wide as every picture
+HEIGHT_IN, COLUMNS = 4.2, 2
 SENSED, EXTERNAL = r"$\tau_\mathrm{sense}$", r"$\tau_\mathrm{ext}$"
 DASH: dict[str, Any] = {"color": FAINT, "linewidth": 1.2}
 DOT: dict[str, Any] = {"color": FORWARD, "markerfacecolor": "none", "zorder": 3}
@@ -22,7 +22,7 @@ def draw_torques(fits: Sequence[JointFit]) -> Figure:
     for axis, (numbers, loads, _) in zip(axes, fits, strict=True):
         bound_nm, configured_nm_a = numbers["paper_rmse_nm"], numbers["configured_nm_a"]
         whole_nm = np.array([0.0, 1.08 * max(loads.torque_nm)])
-        axis.fill_between(whole_nm, whole_nm - bound_nm, whole_nm + bound_nm, color="0.85", linewidth=0.0)
+        axis.fill_between(whole_nm, whole_nm - bound_nm, whole_nm + bound_nm, color=BODY, linewidth=0.0)
         axis.plot(whole_nm, whole_nm, label=f"equal ± {bound_nm:g} N·m, the paper's RMSE", **DASH)
         configured_nm, label = configured_nm_a * loads.current_a, f"configured: {configured_nm_a:g} N·m/A"
         axis.plot(loads.torque_nm, configured_nm, "x", color=INK, markersize=5, label=label)
@@ -58,11 +58,14 @@ def _panels(fits: Sequence[JointFit], xlabel: str, ylabel: str) -> tuple[Figure,
     """Return one panel for each joint, two in a row."""
     columns = min(COLUMNS, len(fits))
     rows = -(-len(fits) // columns)
-    figure = Figure(figsize=(WIDTH_IN * columns, HEIGHT_IN * rows))
+    figure = Figure(figsize=(WIDTH_IN * columns / COLUMNS, HEIGHT_IN * rows))
     axes: list[Axes] = list(figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).flat)
     for axis, fit in zip(axes, fits, strict=False):
         axis.set(title=fit.numbers["joint"].replace("_", " "), xlabel=xlabel, ylabel=ylabel)
         axis.label_outer()
+    for axis in axes[len(fits) - columns : len(fits)]:  # the lowest of each column, also above an empty panel
+        axis.set_xlabel(xlabel)
+        axis.tick_params(labelbottom=True)
     for axis in axes[len(fits) :]:
         axis.set_axis_off()
     return figure, axes[: len(fits)]

@@ -16,7 +16,7 @@ from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
 from experiments.reports.mud_styles import LABELS, MARKS, name_decades
-from experiments.reports.style import FAINT, INK
+from experiments.reports.style import FAINT, INK, WIDTH_IN
 from experiments.reports.value_text import N_CM3
 
 COLOURS = dict(zip(COEFFICIENTS, ("C0", "C1", "C2"), strict=True))
@@ -138,7 +138,7 @@ def _draw_panels(
     **shared: Any,
 ) -> Figure:
     """Draw a row of panels for each method, from what `prepare` makes of its estimates; `columns` have a title each."""
-    figure = Figure(figsize=(3.4 * max(len(columns), 2), 2.9 * len(METHODS)))
+    figure = Figure(figsize=(WIDTH_IN, 2.9 * len(METHODS)))
     rows = figure.subplots(len(METHODS), max(len(columns), 1), squeeze=False, **shared)
     for panels, method in zip(rows, METHODS, strict=True):
         prepared = prepare(estimates[estimates["method"] == method])

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+WIDTH_IN = 10.0  # of a picture on a page
 INK = "#33302c"
 FAINT = "#8c867d"  # helper lines and small text
 MUD_SHADES = ("#f4eee2", "#e6dac4", "#d6c6a8")  # one after the other along the track
@@ -28,6 +29,7 @@ STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.titlesize": "medium",
     "figure.constrained_layout.use": True,
+    "figure.figsize": (WIDTH_IN, 4.5),
     "legend.fontsize": "small",
     "pdf.fonttype": 42,  # TrueType: journals refuse matplotlib's own Type 3
     "savefig.dpi": 120,

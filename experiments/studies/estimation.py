@@ -21,6 +21,7 @@ from estimation.estimation_parameters import EstimationParameters
 from experiments.reports.coefficient_table import compared_frame
 from experiments.reports.error_table import error_rows, plate_rows
 from experiments.reports.mud_names import mud_text
+from experiments.reports.style import FAINT, WIDTH_IN
 from experiments.reports.text_tables import number
 from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result, Table
@@ -227,7 +228,7 @@ def draw_errors(errors: Sequence[Row]) -> Drawing:
     """Draw median and 95th percentile of the error by setup, coefficient, mud and method."""
     rows = DataFrame(errors)
     setups = rows["setup"].unique()
-    figure = Drawing(figsize=(4.0 * len(COEFFICIENTS), 2.8 * len(setups)))
+    figure = Drawing(figsize=(WIDTH_IN, 2.8 * len(setups)))
     panels = figure.subplots(len(setups), len(COEFFICIENTS), squeeze=False)
     for (setup, name), panel in zip(product(setups, COEFFICIENTS), panels.flat, strict=True):
         _draw_panel(panel, rows[(rows["setup"] == setup) & (rows["coefficient"] == name)])
@@ -253,7 +254,7 @@ def _draw_panel(panel: Axes, rows: DataFrame) -> None:
         panel.plot(xs, medians, "o", color=colour, label=method)
     for mud in rows.loc[(rows["method"] == DEFAULT) & (rows["bounds"] > 0) & (rows["strides"] == 0), "mud"]:
         panel.text(muds.index(mud), 2.0, "bounds", ha="center", color=COLOURS[DEFAULT], fontsize="small")
-    panel.axhline(10.0, color="grey", linewidth=0.8, linestyle=":")
+    panel.axhline(10.0, color=FAINT, linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), list(map(mud_text, muds)))
     panel.set_yscale("symlog", linthresh=20.0)
     panel.set_yticks([0, 5, 10, 20, 50, 100], ["0", "5", "10", "20", "50", "100"])

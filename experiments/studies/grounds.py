@@ -19,6 +19,7 @@ from pandas import DataFrame
 from estimation.estimation_parameters import EstimationParameters
 from experiments.reports.coefficient_table import compared_frame
 from experiments.reports.error_table import error_frame
+from experiments.reports.mud_styles import LINES
 from experiments.studies.estimation import ENDLESS_M, SETUPS, STRIDES
 from experiments.studies.sweep import METHOD_STRIDES, Summary, sweep_of, sweep_row
 from experiments.study.option import Option
@@ -122,10 +123,11 @@ def estimate(ground: str, setup: str, seed: int) -> dict[str, Any]:
 
 def draw(swept: Mapping[str, Summary]) -> Drawing:
     """Draw speed over depth for each ground, and where the robot's own choice lies."""
-    figure = Drawing(figsize=(9.0, 4.5))
+    figure = Drawing()
     panel = figure.subplots()
     for n, (name, own) in enumerate(swept.items()):
-        panel.plot("depth_cm", "mean", "-", data=DataFrame(own["constant"]), color=f"C{n}", linewidth=1.0, label=name)
+        look: dict[str, Any] = {"color": f"C{n}", "linestyle": LINES[n % len(LINES)], "linewidth": 1.2, "label": name}
+        panel.plot("depth_cm", "mean", data=DataFrame(own["constant"]), **look)
         for chosen in own["methods"].values():
             panel.plot(chosen["depth_cm"], chosen["mean"], "o", color=f"C{n}")
     panel.set(xlabel="depth (cm); dots: chosen by the robot", ylabel="speed (cm/s)")

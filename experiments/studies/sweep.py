@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from pandas import DataFrame
 
 from control.parameters.adaptation_parameters import Method
+from experiments.reports.style import FAINT, INK, WIDTH_IN
 from experiments.reports.text_tables import number
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
-from experiments.trackway.plots import MARKS, TEXT
+from experiments.trackway.plots import MARKS
 from experiments.trackway.simulated_walk import (
     CONSTANT_STRIDES,
     LEARNING,
@@ -43,7 +44,8 @@ from simulation.mud.disturbances import TRACKWAY
 SCHEMA = 2
 STRENGTHS_PA = (300.0, 400.0, 500.0, 680.0, 1000.0, 1500.0, 2000.0, 2800.0, 3250.0, 4000.0, 5000.0, 6000.0)
 METHOD_STRIDES = 12
-METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
+METHOD_COLOURS = ("white", "C1", "C5", "C4")  # seen on the map
+FAILED_PT = (7, -14, 16, -23)  # from a dot to its number of failed strides, which no other method writes over
 OFFSET = 1.03  # between the methods' dots, as a factor of strength, so that none hides another
 Summary = dict[str, Any]
 
@@ -140,27 +142,27 @@ def _cell(settled: Summary) -> str:
 
 def draw(muds: Sequence[Summary]) -> Drawing:
     """Draw speed over strength and depth with each method's choice, and below it each method's fraction of the best."""
-    figure = Drawing(figsize=(9.0, 7.2))
+    figure = Drawing(figsize=(WIDTH_IN, 7.6))
     over, below = figure.subplots(2, 1, height_ratios=(2.2, 1.0), sharex=True)
     strengths_kpa = np.array([mud["strength_pa"] / 1000.0 for mud in muds])
     _draw_map(figure, over, muds, strengths_kpa)
     best = [mud["best"]["depth_cm"] for mud in muds]
-    over.plot(strengths_kpa, best, color="black", linewidth=1.2, linestyle="--", label="best constant depth")
+    over.plot(strengths_kpa, best, color=INK, linewidth=1.2, linestyle="--", label="best constant depth")
     methods = list(muds[0]["methods"])
     for i, method in enumerate(methods):
         colour = METHOD_COLOURS[i % len(METHOD_COLOURS)]
         shifted_kpa = strengths_kpa * OFFSET ** (i - (len(methods) - 1) / 2.0)
         settled = DataFrame([mud["methods"][method] for mud in muds]).assign(kpa=shifted_kpa)
         _draw_choice(over, settled, method, colour)
-        _draw_fraction(below, settled, method, colour, 7 if i == 0 else -12 * i)
+        _draw_fraction(below, settled, method, colour, FAILED_PT[i % len(FAILED_PT)])
     over.invert_yaxis()
     over.set(ylabel="insertion depth (cm)", title="Speed of constant depths, and where the adaptation settles")
-    over.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
-    below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
+    over.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor=FAINT, labelcolor="white")
+    below.axhline(100.0, color=FAINT, linewidth=0.8, linestyle=":")
     below.set(
         xscale="log",
         xlabel="undrained strength of the mud (kPa); numbers at the dots: failed strides after the second",
-        ylabel="% of the best constant depth",
+        ylabel="% of the best constant",
         ylim=(0.0, max(130.0, below.get_ylim()[1])),
     )
     below.set_xticks(strengths_kpa, [f"{strength:g}" for strength in strengths_kpa])
@@ -194,13 +196,13 @@ def _draw_choice(panel: Axes, settled: DataFrame, method: str, colour: str) -> N
     depths_cm = known["depth_cm"].to_numpy(float)
     errors_cm = abs(np.array(known["depth_range_cm"].tolist()).reshape(-1, 2).T - depths_cm)
     panel.errorbar(known["kpa"], depths_cm, errors_cm, color=colour, label=f"method {method}",
-                   fmt="o", markeredgecolor="black", markersize=7, capsize=3, linewidth=1.2)  # fmt: skip
+                   fmt="o", markeredgecolor=INK, markersize=7, capsize=3, linewidth=1.2)  # fmt: skip
 
 
 def _draw_fraction(panel: Axes, settled: DataFrame, method: str, colour: str, points: int) -> None:
     """Draw the fractions of the best speed; failures are written `points` above the dots."""
     settled = settled.assign(percent=100.0 * settled["fraction_of_best"].astype(float).fillna(0.0))
-    line = TEXT if colour == "white" else colour
+    line = INK if colour == "white" else colour
     panel.plot("kpa", "percent", "-o", data=settled, color=line, markerfacecolor=colour, markersize=6, label=method)
     for each in settled.itertuples():
         if each.failed:

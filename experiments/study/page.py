@@ -36,8 +36,9 @@ th { text-align: left; border-top: 1.5px solid #111; border-bottom: 1px solid #1
 th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap } th, td.long { white-space: normal }
 th { vertical-align: bottom } .number { text-align: right }
 thead { display: table-header-group } tr { break-inside: avoid }
-figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
+figure { margin: 1em 0; break-inside: avoid; overflow-x: auto } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
+@media screen and (max-width: 44em) { body { padding: 0 1em } img { max-width: none; width: 44em } }
 @page { size: A4; margin: 15mm }
 @media print { body { margin: 0; padding: 0; max-width: none; font-size: 10.5px } h2, caption { break-after: avoid }
   .table { overflow: visible } th, td { padding-right: 0.8em } img { max-height: 240mm } }
@@ -122,6 +123,7 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     title, version = escape(result.title), escape(software_version())
     yield f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+    yield '<meta name="viewport" content="width=device-width">'
     yield f"<style>\n{PAGE_STYLE}</style></head><body>\n<h1>{title}</h1>"
     yield f'<p class="when">{made}, mudskipper {version}</p>'
     parts: list[Table | Figure] = [*result.tables, *result.figures]

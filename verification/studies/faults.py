@@ -16,6 +16,7 @@ from pandas import DataFrame
 
 from drivers.drive_types import DEFAULT
 from drivers.fault_injection.failure_table import BY_NAME, PHASES
+from experiments.reports.style import INK, TRAIL, WIDTH_IN
 from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result, Table
 from experiments.study.session import Ending
@@ -29,7 +30,7 @@ FAULTS = tuple(dict.fromkeys(mode.fault for mode in BY_NAME.values()))
 TICKS = ("bound_ticks", "reaction_ticks", "reported_ticks", "zero_torque_ticks")  # whole numbers, or None
 COLUMNS = 2  # panels side by side: there are many faults
 HIGHEST_PERCENT = 100.0
-DARK_PERCENT = 65.0  # from here on letters are white
+DARK_PERCENT = 55.0  # from here on letters are white
 Cells = Sequence[dict[str, Any]]
 
 
@@ -141,17 +142,16 @@ def _table(by_mode: Cells) -> Table:
 def draw(cells: Cells, by_mode: Cells) -> Drawing:
     """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell.
 
-    Where no reaction is demanded the energy takes the place of the ticks. The label of a row has the bound of the
-    ticks, and the energy of a motor with its bound.
+    Where no reaction is demanded the energy of a motor takes the place of the ticks. The label of a row has the bound.
     """
     phases = [phase for phase in PHASES if any(cell["phase"] == phase for cell in cells)]
     columns = min(COLUMNS, len(by_mode))
     per_panel = -(-len(by_mode) // columns)
-    figure = Drawing(figsize=(12.0, 1.6 + 0.22 * per_panel), layout="constrained")
+    figure = Drawing(figsize=(WIDTH_IN, 1.6 + 0.22 * per_panel))
     panels = figure.subplots(1, columns, squeeze=False)[0]
     for i, panel in enumerate(panels):
         mesh = _draw_panel(panel, cells, by_mode[i * per_panel : (i + 1) * per_panel], phases)
-    bar = figure.colorbar(mesh, ax=list(panels), pad=0.01, shrink=0.6, aspect=40, extend="max")
+    bar = figure.colorbar(mesh, ax=list(panels), location="bottom", pad=0.01, shrink=0.6, aspect=40, extend="max")
     bar.set_label("% of the bound: slowest reaction in ticks of 2.63 ms; where none is demanded, energy in J")
     ok = sum(cell["ok"] for cell in cells)
     title = f"From the injection to the reaction: {ok} of {len(cells)} cells within every bound"
@@ -171,7 +171,7 @@ def _draw_panel(panel: Axes, cells: Cells, rows: Cells, phases: Sequence[str]) -
     )
     panel.set_facecolor("#f4f4f4")
     panel.invert_yaxis()
-    panel.set_xticks(np.arange(len(phases)) + 0.5, list(phases), rotation=35, ha="left", fontsize="small")
+    panel.set_xticks(np.arange(len(phases)) + 0.5, list(phases), rotation=60, ha="left", fontsize="small")
     panel.xaxis.tick_top()
     panel.set_yticks(np.arange(len(rows)) + 0.5, [_label(row) for row in rows], fontsize="x-small")
     panel.grid(visible=False)
@@ -181,8 +181,7 @@ def _draw_panel(panel: Axes, cells: Cells, rows: Cells, phases: Sequence[str]) -
 
 
 def _label(row: dict[str, Any]) -> str:
-    bound = "" if row["bound_ticks"] is None else f"  ≤ {row['bound_ticks']}"
-    return f"{row['mode_name']}{bound}  {row['energy_j']:.1f} ≤ {row['energy_bound_j']:.1f} J"
+    return f"{row['mode_name']}  ≤ {row['bound_ticks'] or '{:.1f} J'.format(row['energy_bound_j'])}"
 
 
 def _write_cell(panel: Axes, x: int, y: int, cells: Cells) -> float:
@@ -194,8 +193,8 @@ def _write_cell(panel: Axes, x: int, y: int, cells: Cells) -> float:
     else:
         largest = max(cells, key=lambda cell: cell["energy_j"] - cell["energy_bound_j"])
         text, percent = f"{largest['energy_j']:.1f}", 100.0 * largest["energy_j"] / max(largest["energy_bound_j"], 1e-9)
-    colour = "white" if percent > DARK_PERCENT else "#333333"
+    colour = "white" if percent > DARK_PERCENT else INK
     panel.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=6.5, color=colour)
     if not all(cell["ok"] for cell in cells):
-        panel.plot(x + 0.5, y + 0.5, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
+        panel.plot(x + 0.5, y + 0.5, "x", color=TRAIL, markersize=11, markeredgewidth=2.0)
     return percent

@@ -98,6 +98,7 @@ def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
 
 
 def test_the_picture_has_a_line_for_each_gait_and_a_dot_for_each_speed() -> None:
-    panels = {panel.get_ylabel(): panel for panel in draw_trackway(reported().summary).axes}
+    figure = draw_trackway(reported().summary)
+    panels = {panel.get_ylabel(): panel for panel in figure.axes}
     assert set(panels) == {"step length (cm)", "depth (cm)", "speed (cm/s)"}
-    assert len(panels["step length (cm)"].lines) >= 4 and panels["step length (cm)"].get_legend() is not None
+    assert len(panels["step length (cm)"].lines) >= 4 and figure.legends
