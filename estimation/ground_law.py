@@ -87,17 +87,21 @@ def _error(law: Law, geometry: FlipperGeometry, readings: Mapping[str, Reading])
 def readings_of(measured: Iterable[tuple[str, Any]]) -> dict[str, Reading]:
     """Return the medians of the strides' coefficients, which are estimates or rows of a table with the same names.
 
-    A k_e that is too small to differ from zero, as in sand, counts with its error, as the most that it may be.
+    A k_e that is too small to differ from zero, as in sand, counts with its error, as the most that it may be. A
+    coefficient that fewer than half of the strides have is left out: in firm ground, which only bounds k_s, the one
+    value is that of a stride that swept into another mud.
     """
-    values: dict[str, list[Reading]] = {name: [] for name in COEFFICIENTS}
-    faint: list[Reading] = []
+    found: dict[str, list[Reading]] = {name: [] for name in COEFFICIENTS}
     for name, each in measured:
-        if each.valid and not each.at_least:
-            values[name].append((each.value, each.depth_m))
-        elif name == "k_e" and not each.at_least and each.value + each.std_error > 0.0 and each.depth_m > 0.0:
-            faint.append((each.value + each.std_error, each.depth_m))
-    values["k_e"] = values["k_e"] or faint
-    return {name: (median(k for k, _ in found), median(z for _, z in found)) for name, found in values.items() if found}
+        faint = name == "k_e" and not each.valid and each.value + each.std_error > 0.0
+        if not each.at_least and each.depth_m > 0.0 and (each.valid or faint):
+            found[name].append((each.value + faint * each.std_error, each.depth_m))
+    half = max(map(len, found.values())) / 2.0
+    return {
+        name: (median(k for k, _ in own), median(z for _, z in own))
+        for name, own in found.items()
+        if len(own) >= max(half, 1.0)
+    }
 
 
 def law_of_strides(geometry: FlipperGeometry, strides: Iterable[StrideEstimate]) -> LawEvidence | None:

@@ -100,7 +100,7 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
         "deepest_m": max(depths_m),
         "both": _gathered(estimates),
         "law": law_report(law),
-        "findings": [*_depth_findings(values), *ground_finding(law)],
+        "findings": [*_depth_findings(values), *ground_finding(law, len(strides))],
         "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
     }
 
@@ -131,9 +131,12 @@ def _ground_law(run: Run, estimates: DataFrame) -> LawEvidence | None:
     return law_evidence(run.walks[0].geometry, readings) if run.walks else None
 
 
-def ground_finding(law: LawEvidence | None) -> list[str]:
-    """Return a sentence where the coefficients of a ground do not compare as those of mud."""
-    if law is None or law.name == "mud":
+def ground_finding(law: LawEvidence | None, strides: int) -> list[str]:
+    """Return a sentence where the coefficients of a ground do not compare as those of mud.
+
+    A single stride may have gone down in one mud and swept into the next, so it finds nothing.
+    """
+    if law is None or law.name == "mud" or strides < 2:
         return []
     wrong = " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law.errors.items())
     finding = "no known law explains" if law.name == UNDECIDED else f"the law of {law.name} explains"

@@ -88,6 +88,13 @@ def test_lower_bounds_are_left_out() -> None:
     assert law_evidence(GEOMETRY, readings_of(estimates("mud", k_s=bound, k_p=bound))) is None
 
 
+def test_the_one_value_of_a_stride_that_swept_into_another_mud_is_left_out() -> None:
+    bounded = estimates("mud", k_s={"at_least": True})
+    swept = estimates("mud", k_s={"value": 0.2 * dict(estimates("mud"))["k_s"].value})
+    assert set(readings_of([*bounded, *bounded, *swept])) == {"k_p", "k_e"}
+    assert set(readings_of([*bounded, *swept])) == {"k_p", "k_s", "k_e"}
+
+
 def test_an_extraction_that_is_too_faint_to_be_told_from_nothing_is_that_of_sand() -> None:
     faint = {"value": 1e4, "std_error": 2e4, "valid": False}
     evidence = law_evidence(GEOMETRY, readings_of(estimates("sand", k_e=faint)))

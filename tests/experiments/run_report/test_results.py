@@ -188,5 +188,6 @@ def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_r
 
 def test_a_ground_that_does_not_keep_the_law_of_mud_is_a_finding() -> None:
     errors = {"mud": 2.0, "sand": 0.1}
-    assert ground_finding(None) == ground_finding(LawEvidence("mud", errors)) == []
-    assert len(ground_finding(LawEvidence("sand", errors))) == len(ground_finding(LawEvidence(UNDECIDED, errors))) == 1
+    assert ground_finding(None, 9) == ground_finding(LawEvidence("mud", errors), 9) == []
+    for name in ("sand", UNDECIDED):
+        assert [len(ground_finding(LawEvidence(name, errors), strides)) for strides in (1, 2)] == [0, 1]
