@@ -1,11 +1,10 @@
 """Starts a simulated robot and its daemon for a program of one's own."""
 
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import tomlkit
@@ -33,8 +32,8 @@ def simulate(world: World | None = None, robot: str | Path | None = None, seed: 
     ...     client.wait_for("hold")["mode"]
     'hold'
     """
-    folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
-    try:
+    with TemporaryDirectory(prefix="mudskipper-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
         logs, text = folder / "logs", ""
         if robot is not None:
             text = read_text(Path(robot))
@@ -42,14 +41,24 @@ def simulate(world: World | None = None, robot: str | Path | None = None, seed: 
             text = local_copy(text, folder, logs)
         processes = LocalRobot(folder, logs, seed, _world_file(world, folder), text)
         try:
-            processes.connect().close()
-            with Client(processes.socket) as client:
-                _await_ready(client, processes)
+            with ready_client(processes) as client:
                 yield client
         finally:
             processes.end()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def ready_client(processes: LocalRobot) -> Iterator[Client]:
+    """Yield a Client once the robot is ready to arm. Raises NoDaemonError and TimeoutError."""
+    processes.connect().close()
+    with Client(processes.socket) as client:
+        deadline_s = time.monotonic() + READY_S
+        while (report := client.status())["mode"] != "idle" or report["fault"]:
+            processes.check_processes()
+            if time.monotonic() > deadline_s:
+                raise TimeoutError(f"the simulated robot is not ready after {READY_S:g} s: {report['fault']}")
+            time.sleep(POLL_S)
+        yield client
 
 
 def _world_file(world: World | None, folder: Path) -> Path | None:
@@ -61,12 +70,3 @@ def _world_file(world: World | None, folder: Path) -> Path | None:
     path = folder / "world.toml"
     path.write_text(tomlkit.dumps(world.tables), encoding="utf-8")
     return path
-
-
-def _await_ready(client: Client, processes: LocalRobot) -> None:
-    deadline_s = time.monotonic() + READY_S
-    while (report := client.status())["mode"] != "idle" or report["fault"]:
-        processes.check_processes()
-        if time.monotonic() > deadline_s:
-            raise TimeoutError(f"the simulated robot is not ready after {READY_S:g} s: {report['fault']}")
-        time.sleep(POLL_S)

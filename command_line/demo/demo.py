@@ -6,15 +6,16 @@ It uses the interfaces that operators and their programs use, and ends with a su
 import os
 import signal
 import sys
-from contextlib import redirect_stdout
+import time
+from contextlib import closing, redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import numpy as np
 
 from command_line import exit_codes
-from command_line.demo.demonstration import ENDING_SIGNALS, Demo, running_demo
 from command_line.errors import CommandError, missing_library
 from command_line.json_output import Answer
 from command_line.robot_text import Report, machine_lines
@@ -27,10 +28,16 @@ from experiments.study.option import Option
 from experiments.study.values import folder
 from firmware_host.log.log_folder import DONE, log_files, present_path
 from logs.files.log_reader import read_log
+from mudskipper.client import POLL_S, Client
+from mudskipper.simulated_robot import ready_client
 from operator_client.status_client import CallRefusedError, NoDaemonError
+from simulation.harness.local_robot import LocalRobot
 from simulation.harness.world import load_world
-from simulation.mud.track import Track
+from simulation.mud.track import Track, paper_track
 
+LONGEST_WALK_S = 60.0
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+FINISH_M = 0.02  # before the end of the track
 LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stride begins
 
 
@@ -44,54 +51,96 @@ def demo(
     ] = None,
     world: Annotated[Path | None, Option("describes the ground (default: three muds)")] = None,
 ) -> Answer:
-    for number in ENDING_SIGNALS:  # each ends the demo as Ctrl-C does
+    for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
-            signal.signal(number, signal.default_int_handler)
-    if world:
-        load_world(world)  # is refused before anything starts
+            signal.signal(number, _interrupt)
+    track = load_world(world).track if world else paper_track()  # is refused before anything starts
     if find_spec("matplotlib") is None:
         complain(f"the walk gets no plot: {missing_library('matplotlib')}")
     out.mkdir(parents=True, exist_ok=True)
     before = set(log_files(out, DONE))
     try:
         with redirect_stdout(sys.stderr if json else sys.stdout):  # data goes to standard output, all else not
-            report, demonstration = _perform(out, seed, depth, world)
-            summary = _conclude(out, report, demonstration)
+            print("Starting a simulated robot and the daemon ...", flush=True)
+            # short, as the path of a Unix socket must be
+            with TemporaryDirectory(prefix="mudskipper-", ignore_cleanup_errors=True) as files:
+                report, strides = _perform(LocalRobot(Path(files), out, seed, world), track, depth)
+            summary = _conclude(out, report, strides, track)
     except KeyboardInterrupt as problem:
         for path in sorted(set(log_files(out, DONE)) - before):
             print(f"\nlog      {path}")
         raise CommandError(str(problem) or "stopped", status=exit_codes.INTERRUPTED) from None
-    except (NoDaemonError, CallRefusedError) as problem:
+    except (NoDaemonError, CallRefusedError, TimeoutError, RuntimeError) as problem:
         raise CommandError(str(problem)) from None
     return Answer(summary, "", schema="demo")
 
 
-def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -> tuple[Report, Demo]:
-    print("Starting a simulated robot and the daemon ...", flush=True)
-    with running_demo(out, seed, world) as demonstration:
+def _interrupt(*_: object) -> None:
+    """End the demo as Ctrl-C does; further signals are ignored, since the robot stops meanwhile."""
+    for number in ENDING_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _perform(robot: LocalRobot, track: Track, depth_cm: float | None) -> tuple[Report, list[Report]]:
+    """Walk to the end of the track, end the robot, and return its last status and its strides.
+
+    A KeyboardInterrupt says in which state the robot ended.
+    """
+    state = "stopped before torque was on"
+    try:
         os.nice(5)  # the display gives way to robot and daemon
-        demonstration.connect()
-        print("Arming ...", flush=True)
-        demonstration.arm()
-        muds = ", ".join(mud_text(segment.ground.name) for segment in demonstration.track.segments)
-        water = " water" if muds.endswith("%") else ""
-        print(f"Walking {demonstration.track.length_m:.2f} m over mud with {muds}{water}.\n")
-        print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
-
-        def show(stride: Report) -> None:
-            print(stride_line(stride, demonstration.walk_start_s), flush=True)
-
-        demonstration.walk(depth_cm, show)
-        report = demonstration.stop()
-        demonstration.fetch_strides(show)
-        return report, demonstration
+        with ready_client(robot) as client:
+            print("Arming ...", flush=True)
+            state = "stopped: torque is off, the log is closed"
+            client.arm()
+            client.wait_for("hold")
+            return _walk(robot, client, track, depth_cm)
+    except KeyboardInterrupt:
+        robot.end()
+        if status := robot.daemon.returncode:
+            state = f"stopped, but the daemon ended with status {status}"
+        raise KeyboardInterrupt(state) from None
+    finally:
+        robot.end()
 
 
-def _conclude(out: Path, report: Report, demonstration: Demo) -> Report:
+def _walk(robot: LocalRobot, client: Client, track: Track, depth_cm: float | None) -> tuple[Report, list[Report]]:
+    """Walk for LONGEST_WALK_S at most, and switch the torque off."""
+    muds = ", ".join(mud_text(segment.ground.name) for segment in track.segments)
+    water = " water" if muds.endswith("%") else ""
+    print(f"Walking {track.length_m:.2f} m over mud with {muds}{water}.\n")
+    print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
+    strides: list[Report] = []
+    with closing(robot.connect()) as daemon:
+        daemon.call("reset_timing")
+    client.walk(depth_m=None if depth_cm is None else depth_cm / 100.0)
+    start_s = time.monotonic()
+
+    def fetch_strides() -> None:
+        while fetched := client.strides(len(strides)):
+            strides.extend(fetched)
+            for stride in fetched:
+                print(stride_line(stride, start_s), flush=True)
+
+    position_m = 0.0
+    while position_m < track.length_m - FINISH_M and time.monotonic() < start_s + LONGEST_WALK_S:
+        robot.check_processes()
+        position_m = client.wait_for("walking")["body_x_m"] or 0.0
+        fetch_strides()
+        time.sleep(POLL_S)
+    client.stop()
+    report = client.wait_for("hold")
+    client.disarm()
+    fetch_strides()
+    return report, strides
+
+
+def _conclude(out: Path, report: Report, strides: list[Report], track: Track) -> Report:
     """Print the summary, draw the plot, and return the summary."""
     log_path = present_path(Path(report["log"]["path"]))
     plot_path = out / log_path.with_suffix(".png").name if find_spec("matplotlib") else None
-    summary = summarise(report, demonstration, log_path, plot_path)
+    summary = summarise(report, strides, track, log_path, plot_path)
     print(f"\n{summary_text(summary, report)}", flush=True)
     if plot_path is None:
         return summary
@@ -100,15 +149,15 @@ def _conclude(out: Path, report: Report, demonstration: Demo) -> Report:
     from experiments.pictures.recorded_walk import read_walk
     from experiments.pictures.walk_plot import plot_walk  # matplotlib loads slowly; the walk must not wait
 
-    plot_walk(read_walk(log_path), plot_path, layout_of_track(demonstration.track))
+    plot_walk(read_walk(log_path), plot_path, layout_of_track(track))
     print(f"plot     {plot_path}")
     return summary
 
 
-def summarise(report: Report, demonstration: Demo, log_path: Path, plot_path: Path | None) -> Report:
+def summarise(report: Report, strides: list[Report], track: Track, log_path: Path, plot_path: Path | None) -> Report:
     rows = read_log(log_path, fields=("mode", "stamp_s", "body_x_m")).ticks
     walked = rows[(rows["mode"] == Mode.WALKING) & np.isfinite(rows["body_x_m"])]
-    stamps_s, positions_m, track = walked["stamp_s"], walked["body_x_m"], demonstration.track
+    stamps_s, positions_m = walked["stamp_s"], walked["body_x_m"]
 
     def mud_of(stride: Report) -> str:
         start_m = float(np.interp(stride["t_start_s"], stamps_s, positions_m)) if len(walked) else 0.0
@@ -116,7 +165,7 @@ def summarise(report: Report, demonstration: Demo, log_path: Path, plot_path: Pa
 
     return {
         **report["loop"],
-        "strides": [stride | {"mud": mud_of(stride)} for stride in demonstration.strides],
+        "strides": [stride | {"mud": mud_of(stride)} for stride in strides],
         "speed_cm_s": speeds_cm_s(stamps_s, positions_m, track),
         "dropped_rows": report["log"]["dropped"],
         "warnings": report["warnings"],
