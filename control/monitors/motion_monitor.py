@@ -49,9 +49,9 @@ FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
 SLOW_RAD_S = 3.0  # of a joint that is not on its way to or fro, and may slip at 1 rad/s
 NEAR_LIMIT_FRACTION = 0.9  # of the torque limit
-DRIVEN_BACK_S = 0.09
-DRIVEN_BACK_RAD_S = 0.03  # seven steps of a 14-bit encoder in an interval
-PROBED = 3  # intervals in a row; a body that sinks pushes a swing back in two
+DRIVEN_BACK_S = 0.06
+DRIVEN_BACK_RAD_S = 0.03  # five steps of a 14-bit encoder in an interval
+PROBED = 3  # intervals in a row; a body that sinks pushes a swing back for as long
 NOT_YIELDED = PROBED + 2  # the probe, and the interval after it
 PROBE_NM = 0.125  # less torque moves a flipper that carries 1 kg by 11 mrad
 PROBE_S = 0.05  # and after it
@@ -175,7 +175,10 @@ class MotionMonitor:
         leads = target_back_rad > 0.0 and abs(torque_nm) < near_limit_nm
         self._pressed_s += elapsed_s
         self._back_rad += back_rad - target_back_rad if leads else back_rad
-        if self._pressed_s >= (DRIVEN_BACK_S if self.driven_back < PROBED else PROBE_S):
+        if self._back_rad < -STEADY_RAD and self.driven_back < PROBED:  # the interval begins where the joint turns back
+            self._pressed_s = self._back_rad = 0.0
+            self.driven_back = 0
+        elif self._pressed_s >= (DRIVEN_BACK_S if self.driven_back < PROBED else PROBE_S):
             self._end_interval()
 
     def _watch_rocking(self, elapsed_s: float, step_rad: float, torque_nm: float, reverses: bool) -> None:
