@@ -14,27 +14,14 @@ import zenoh
 CLIENTS = 3
 
 
-class RosViewers:
-    """Owns the processes; `watch` is `mudskipper ros2`."""
-
-    def __init__(self, status_socket: Path) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
-        command = [sys.executable, "-m", "command_line.main", "ros2", "--router", address]
-        environment = os.environ | {"MUDSKIPPER_SOCKET": str(status_socket)}
-        self._others = [
-            subprocess.Popen([sys.executable, "-m", __name__, each, address]) for each in ("router", "peer")
-        ]
-        self.watch = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
-
-    def end(self) -> None:
-        for process in (self.watch, *self._others):
-            process.kill()
-            process.wait()
-
-    @property
-    def all_run(self) -> bool:
-        return all(process.poll() is None for process in (self.watch, *self._others))
+def start_ros_viewers(status_socket: Path) -> list[subprocess.Popen[bytes]]:
+    """Start the processes, `mudskipper ros2` first."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    others = [subprocess.Popen([sys.executable, "-m", __name__, each, address]) for each in ("router", "peer")]
+    command = [sys.executable, "-m", "command_line.main", "ros2", "--router", address]
+    environment = os.environ | {"MUDSKIPPER_SOCKET": str(status_socket)}
+    return [subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL), *others]
 
 
 def open_session(mode: str, address: str) -> zenoh.Session:

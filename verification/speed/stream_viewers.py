@@ -19,38 +19,27 @@ SUBPROTOCOL = "foxglove.sdk.v1"
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 
 
-class Viewers:
-    """Owns the processes."""
+def start_stream_viewers(status_socket: Path) -> list[subprocess.Popen[bytes]]:
+    """Start the processes, the screen first."""
+    master, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, SIZE)
+    command = [sys.executable, "-m", "command_line.main"]
+    environment = os.environ | {"TERM": "xterm-256color", "MUDSKIPPER_SOCKET": str(status_socket)}
+    watch = subprocess.Popen([*command, "watch"], stdin=terminal, stdout=terminal, stderr=terminal, env=environment)
+    os.close(terminal)
+    threading.Thread(target=_drain, args=(master,), daemon=True).start()
+    live = subprocess.Popen([*command, "live", "--port", "0"], env=environment, stdout=subprocess.PIPE)
+    assert live.stdout is not None
+    address = live.stdout.readline().decode().split()[2].rstrip(";")
+    return [watch, live, subprocess.Popen([sys.executable, "-m", __name__, address])]
 
-    def __init__(self, status_socket: Path) -> None:
-        self._master, terminal = pty.openpty()
-        termios.tcsetwinsize(terminal, SIZE)
-        command = [sys.executable, "-m", "command_line.main"]
-        environment = os.environ | {"TERM": "xterm-256color", "MUDSKIPPER_SOCKET": str(status_socket)}
-        self.watch = subprocess.Popen(
-            [*command, "watch"], stdin=terminal, stdout=terminal, stderr=terminal, env=environment
-        )
-        os.close(terminal)
-        threading.Thread(target=self._drain, daemon=True).start()
-        self._live = subprocess.Popen([*command, "live", "--port", "0"], env=environment, stdout=subprocess.PIPE)
-        assert self._live.stdout is not None
-        address = self._live.stdout.readline().decode().split()[2].rstrip(";")
-        self._clients = subprocess.Popen([sys.executable, "-m", __name__, address])
 
-    def _drain(self) -> None:
-        with suppress(OSError):  # the screen has ended
-            while os.read(self._master, 65536):
-                pass
-
-    def end(self) -> None:
-        for process in (self._clients, self._live, self.watch):
-            process.terminate()
-            process.wait()
-        os.close(self._master)
-
-    @property
-    def all_run(self) -> bool:
-        return all(process.poll() is None for process in (self.watch, self._live, self._clients))
+def _drain(terminal: int) -> None:
+    """Read what a screen draws until it ends."""
+    with suppress(OSError):
+        while os.read(terminal, 65536):
+            pass
+    os.close(terminal)
 
 
 def cpu_s(process: subprocess.Popen[bytes]) -> float:

@@ -6,19 +6,22 @@ A turn with viewers begins once they have settled, and a ratio is that of pairs 
 clients. With `--viewers ros2` they are `mudskipper ros2`, a Zenoh router and three subscribers to all topics.
 """
 
+import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
 from verification.benchmark import Report, evaluated, measure_in_turns, paired_ratio, run_benchmark
 from verification.local_robot import LocalRobot
-from verification.speed.ros_viewers import RosViewers
-from verification.speed.stream_viewers import Viewers, cpu_s
+from verification.speed.ros_viewers import start_ros_viewers
+from verification.speed.stream_viewers import cpu_s, start_stream_viewers
 
 BAR_RATIO = 1.03
 BAR_CPU = 0.05  # of a processor, for the screen or `mudskipper ros2`
-KINDS: dict[str, type[Viewers | RosViewers]] = {"screen": Viewers, "ros2": RosViewers}
+Start = Callable[[Path], list[subprocess.Popen[bytes]]]
+KINDS: dict[str, Start] = {"screen": start_stream_viewers, "ros2": start_ros_viewers}
 SETTLING_S = 5.0  # the screen's libraries take a second or two
 FIGURES = [(name, part) for name in ("tick_us", "wake_late_us") for part in ("p50", "p99")]
 
@@ -34,16 +37,18 @@ def time_turn(robot: LocalRobot, seconds: float) -> Report:
     return timing
 
 
-def time_turn_with_viewers(robot: LocalRobot, seconds: float, kind: type[Viewers | RosViewers]) -> Report:
-    viewers = kind(robot.socket)
+def time_turn_with_viewers(robot: LocalRobot, seconds: float, start: Start) -> Report:
+    viewers = start(robot.socket)
     try:
         time.sleep(SETTLING_S)
-        before_s, begun_s = cpu_s(viewers.watch), time.monotonic()
+        before_s, begun_s = cpu_s(viewers[0]), time.monotonic()
         turn = time_turn(robot, seconds)
-        cpu = (cpu_s(viewers.watch) - before_s) / (time.monotonic() - begun_s)
-        return turn | {"viewer_cpu": round(cpu, 4), "all_run": viewers.all_run}
+        cpu = (cpu_s(viewers[0]) - before_s) / (time.monotonic() - begun_s)
+        return turn | {"viewer_cpu": round(cpu, 4), "all_run": all(each.poll() is None for each in viewers)}
     finally:
-        viewers.end()
+        for process in reversed(viewers):
+            process.kill()
+            process.wait()
 
 
 def measure(folder: Path, *, seconds: float = 10.0, pairs: int = 8, viewers: str = "screen") -> Report:
