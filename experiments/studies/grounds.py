@@ -126,8 +126,8 @@ def draw(swept: Mapping[str, Summary]) -> Drawing:
     figure = Drawing()
     panel = figure.subplots()
     for n, (name, own) in enumerate(swept.items()):
-        look: dict[str, Any] = {"color": f"C{n}", "linestyle": LINES[n % len(LINES)], "linewidth": 1.2, "label": name}
-        panel.plot("depth_cm", "mean", data=DataFrame(own["constant"]), **look)
+        look: dict[str, Any] = {"color": f"C{n}", "linestyle": LINES[n % len(LINES)], "linewidth": 1.2}
+        panel.plot("depth_cm", "mean", data=DataFrame(own["constant"]), marker=".", label=name, **look)
         for chosen in own["methods"].values():
             panel.plot(chosen["depth_cm"], chosen["mean"], "o", color=f"C{n}")
     panel.set(xlabel="depth (cm); dots: chosen by the robot", ylabel="speed (cm/s)")
