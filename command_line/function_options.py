@@ -64,8 +64,7 @@ def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> 
 def _refuse_repeated_key(pairs: Sequence[tuple[str, Any]]) -> None:
     keys = [key for key, _ in pairs]
     if twice := next((key for key in keys if keys.count(key) > 1), ""):
-        values = " and ".join(str(value) for key, value in pairs if key == twice)
-        raise usage_error(f"{twice} is given twice, as {values}; give it once")
+        raise usage_error(f"{twice} is given twice; give it once")
 
 
 def flag_of(parameter: str) -> str:

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from pandas import DataFrame
 
 from experiments.reports.mud_styles import name_decades
-from experiments.reports.style import FAINT, FORWARD
+from experiments.reports.style import FAINT, FORWARD, WIDTH_IN
 from experiments.reports.text_tables import value_shown
 
 COLUMNS = 3  # of panels
-WIDTH_IN, PANEL_IN = 10.0, 3.0
+PANEL_IN = 3.0
 FEW = 12  # values of a key that share a mean; of more, as in a random sample, each point stands alone
 DECADE = 10.0  # between the ends of a key on a logarithmic axis, at least
 
@@ -25,7 +25,7 @@ def draw_speeds(points: Sequence[Mapping[str, Any]]) -> Figure:
     keys = list(points[0]["values"])
     columns = min(COLUMNS, len(keys))
     rows = -(-len(keys) // columns)
-    figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows))
     panels: list[Axes] = list(figure.subplots(rows, columns, sharey=True, squeeze=False).flat)
     for panel, key in zip(panels, keys, strict=False):
         _draw_key(panel, key, points)

@@ -94,6 +94,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
     is_drawn = (pairs["value_left"] > 0.0) & (pairs["value_right"] > 0.0)
     drawn = pairs[is_drawn & (pairs["coefficient"] == coefficient)]
     if drawn.empty:
+        panel.set(xticks=[], yticks=[])
         return
     left, right, left_error, right_error = (
         drawn[name] / N_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")

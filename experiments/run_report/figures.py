@@ -18,7 +18,7 @@ from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, mark_of, name_muds
-from experiments.reports.style import FAINT
+from experiments.reports.style import FAINT, WIDTH_IN
 from experiments.reports.value_text import N_CM3
 from experiments.run_report.results import SPEED, Entry, run_labels
 from experiments.run_report.run import Run
@@ -29,7 +29,7 @@ MOST_DRAWN = 10  # strides of each mud, evenly over the run
 MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
 LEGEND_COLUMN_IN = 2.8  # "k_p 1.4 N/cm³, from 3200 s" with its mark
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
-WIDTH_IN, HEIGHT_IN = (6.0, 10.0), 7.2  # with one flipper, and with two
+NARROW_IN, HEIGHT_IN = 6.0, 7.2  # with one flipper
 DRAWN_OF_FIT = ("torques_nm", "residuals_nm")
 MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
@@ -46,8 +46,8 @@ def draw_fits(run: Run) -> Figure:
     """Draw the fits of each coefficient next to their residuals, the left flipper next to the right one."""
     muds, flippers = drawn_muds(run), run.replay.flippers
     looks = {mud: MARK | {key: look[key] for key in ("color", "marker")} for mud, look in looks_of(muds).items()}
-    width_in = WIDTH_IN[len(flippers) - 1]
-    figure = Figure(figsize=(width_in, HEIGHT_IN), layout="constrained")
+    width_in = NARROW_IN if len(flippers) == 1 else WIDTH_IN
+    figure = Figure(figsize=(width_in, HEIGHT_IN))
     axes = figure.subplots(len(COEFFICIENTS), 2 * len(flippers), squeeze=False)
     fitted = run.estimates[run.estimates["samples"].notna() & run.estimates["mud"].isin(muds)]
     for row, name in zip(axes, COEFFICIENTS, strict=True):
@@ -133,7 +133,7 @@ def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:
     muds = {mud_key(result["mud"]): result["mud"].replace(" N/cm³", "") for _, result in results}
     looks = [*looks_of(labels).values()]
     has_speed = any(result["speed_m_s"] is not None for _, result in results)
-    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 6.0))
     axes = figure.subplots(2, 2).flatten() if has_speed else figure.subplots(1, 3)
     for panel, name in zip(axes, [*[SPEED] * has_speed, *COEFFICIENTS], strict=True):
         for run, result in results:

@@ -66,6 +66,7 @@ FIELD_OF_LAYER = {
     "saturation": "current_limit_a",
 }
 LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
+DODGE = 0.15  # between the methods of one mud
 COLOURS = {DEFAULT: "C0", PAPER: "C1", COMPENSATED: "C3"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
@@ -244,16 +245,18 @@ def draw_errors(errors: Sequence[Row]) -> Drawing:
 
 def _draw_panel(panel: Axes, rows: DataFrame) -> None:
     muds = rows["mud"].unique().tolist()
-    for method, colour in COLOURS.items():
+    for n, (method, colour) in enumerate(COLOURS.items()):
         if method == COMPENSATED and "k_s" not in rows["coefficient"].unique():
             continue  # it compensates k_s alone
         known = rows[(rows["method"] == method) & rows["median"].notna()]
-        xs = known["mud"].map(muds.index)
+        xs = known["mud"].map(muds.index).astype(float) + DODGE * (n - 1)
         medians, highest = ((100.0 * known[key].astype(float)).clip(upper=HIGHEST_PERCENT) for key in ("median", "p95"))
         panel.vlines(xs, medians, highest, color=colour, linewidth=2)
         panel.plot(xs, medians, "o", color=colour, label=method)
     for mud in rows.loc[(rows["method"] == DEFAULT) & (rows["bounds"] > 0) & (rows["strides"] == 0), "mud"]:
-        panel.text(muds.index(mud), 2.0, "bounds", ha="center", color=COLOURS[DEFAULT], fontsize="small")
+        panel.text(
+            muds.index(mud) - DODGE, 0.5, "bounds", rotation=90, ha="center", va="bottom", color=COLOURS[DEFAULT]
+        )
     panel.axhline(10.0, color=FAINT, linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), list(map(mud_text, muds)))
     panel.set_yscale("symlog", linthresh=20.0)
