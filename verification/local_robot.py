@@ -72,11 +72,8 @@ class LocalRobot:
 
     def call(self, method: str, **params: Any) -> Any:
         """Call the daemon on a connection of its own."""
-        client = StatusClient(self.socket)
-        try:
+        with StatusClient(self.socket) as client:
             return client.call(method, **params)
-        finally:
-            client.close()
 
     def require_walk(self, rate_hz: float = RATE_HZ) -> None:
         """Arm and walk into the first stance. Ends the benchmark with a sentence where the robot does not."""

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from contextlib import closing, redirect_stdout
+from contextlib import redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -112,7 +112,7 @@ def _walk(robot: LocalRobot, client: Client, track: Track, depth_cm: float | Non
     print(f"Walking {track.length_m:.2f} m over mud with {muds}{water}.\n")
     print(f"{STRIDE_HEAD}\n{STRIDE_UNITS}", flush=True)
     strides: list[Report] = []
-    with closing(robot.connect()) as daemon:
+    with robot.connect() as daemon:
         daemon.call("reset_timing")
     client.walk(depth_m=None if depth_cm is None else depth_cm / 100.0)
     start_s = time.monotonic()

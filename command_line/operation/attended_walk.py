@@ -7,7 +7,6 @@ stops the robot. A control law (run.py) may order each stride, or move the joint
 import sys
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 from command_line import exit_codes
@@ -37,19 +36,21 @@ class LawError(CommandError):
 def attend(client: StatusClient, as_json: bool, params: dict[str, Any], law: LawStep | None = None) -> Answer:
     """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
-    return _attend(client, as_json, partial(_renew, client, as_json, law))
+    return _attend(client, as_json, law)
 
 
 def attend_pose(client: StatusClient, law: LawStep, period_s: float) -> Answer:
     """Let a law move the joints while the robot holds its pose under a lease of this client."""
-    return _attend(client, True, partial(_renew, client, True, law, ("hold",), period_s))
+    return _attend(client, True, law, ("hold",), period_s)
 
 
-def _attend(client: StatusClient, as_json: bool, renew: Callable[[], object]) -> Answer:
+def _attend(
+    client: StatusClient, as_json: bool, law: LawStep | None, modes: Sequence[str] = MOVING, period_s: float = 0.0
+) -> Answer:
     """Renew the lease to the end, which a law that fails and Ctrl-C bring about, and until the robot is at rest."""
     status = exit_codes.OK
     try:
-        renew()
+        _renew(client, as_json, law, modes, period_s)
     except LawError as problem:
         complain(f"{problem}; the robot stops")
         client.call("stop")
