@@ -83,7 +83,7 @@ def simulate(
 ) -> int:
     """Walk a gait in simulated mud, as fast as it computes; print the advance of each stride, what stuck and faults."""
     lockstep = Lockstep(_configuration(config), Track([(TRACK_M, MUDS[mud])]), seed, disturbances=TRACKWAY)
-    lockstep.arm()
+    lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     try:
         calls.methods["walk"]({"gait": as_json(gait_document(gait)), "strides": strides}, CALLER)

@@ -37,3 +37,9 @@ def test_a_file_of_ones_own_is_accepted_or_named(tmp_path: Path, text: str, stat
     assert found.returncode == status
     assert "Traceback" not in found.stderr
     assert status == exit_codes.OK or "mine.toml" in found.stderr
+
+
+def test_a_gait_is_simulated_for_a_robot_that_is_not_calibrated_yet(tmp_path: Path) -> None:
+    robot = str(tmp_path / "robot.toml")
+    assert run("init", robot, "--defaults", "--flippers", "right", "--drive", "mit").returncode == exit_codes.OK
+    assert run("gait", "simulate", "walking", "--strides", "1", "--config", robot).returncode == exit_codes.OK
