@@ -287,7 +287,7 @@ class FaultKind(StrEnum):
         "joint_not_following", "joint", SOFT_STOP, ALWAYS, BY_HAND, 765,
         "A joint stands still at full torque for 2 s.",
         "The {subject} joint stands still at full torque for {stalled_s:.1f} s.",
-        "free the joint, then 'mudskipper clear'",
+        "free the joint, then 'mudskipper clear'; if firm mud holds it, walk less deep",
     )
     JOINT_RUNAWAY = (
         "joint_runaway", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 60,

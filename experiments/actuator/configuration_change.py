@@ -18,8 +18,8 @@ COPY = "mudskipper.toml"  # of a simulated robot's configuration
 LARGEST_UNCERTAINTY = 0.02  # relative, of a torque constant that is written
 WRITE, LEAVE = "y", ""
 SET_DRIVES = (
-    ". Set odrv0.axis0.config.motor.torque_constant of the drives to the same values, then 'systemctl restart"
-    " mudskipper'"
+    ". 'systemctl stop mudskipper', set the drives' own constants to the same values ('mudskipper drives setup' "
+    "compares them), then 'systemctl start mudskipper'"
 )
 
 

@@ -63,8 +63,8 @@ DEFINITIONS = (
 )
 SETTING = (
     "The constant is set in two files, and both must agree. torque_constant_nm_a of [drive.JOINT] in the configuration "
-    "turns the reported current into torque. odrv0.axis0.config.motor.torque_constant in the drive (over USB with "
-    "odrivetool, then save_configuration) turns the commanded torque into current.\n\n"
+    "turns the reported current into torque. The drive's own constant turns the commanded torque into current; "
+    "'mudskipper drives setup' compares both where the drive lets its own be read.\n\n"
     "60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. "
     "ODrive counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. This experiment "
     "shows which of them is true for these drives."
