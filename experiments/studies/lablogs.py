@@ -35,6 +35,7 @@ Groups = Annotated[
         "put logs with such a file name into one group (default: the mud that the log names, or a label, as 12.5N)",
         metavar="PATTERN=NAME",
         parse=parse_rule,
+        keyed=True,
     ),
 ]
 

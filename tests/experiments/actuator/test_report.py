@@ -1,6 +1,7 @@
 """The report of a calibration shows the results and their sources."""
 
 from experiments.actuator.fit import fit_joint
+from experiments.actuator.plots import draw_torques
 from experiments.actuator.report import make_result
 from tests.experiments.actuator.test_fit import PLAN, make_entries
 
@@ -16,3 +17,10 @@ def test_without_loops_there_is_a_report_without_friction() -> None:
     (friction,) = result.tables[1].rows.to_dict("records")
     assert (friction["dry friction"], friction["viscous"]) == ("-", "-")
     assert result.json()["joints"][0]["friction_nm"] is None
+
+
+def test_the_lowest_panel_of_each_column_names_its_axis() -> None:
+    fit = fit_joint("right_sweep", PLAN, make_entries(), 0.083)
+    assert fit is not None
+    panels = draw_torques([fit] * 3).axes
+    assert [bool(panel.get_xlabel()) for panel in panels] == [False, True, True, False]
