@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -13,24 +12,17 @@ from typing import Any
 import pytest
 
 from operator_client.status_client import CallRefusedError, NoDaemonError, StatusClient
-from simulation.harness.local_setup import write_local_setup
+from simulation.harness.local_robot import LocalRobot
 from tests.command_line.command_lines import run
 from tests.waiting import LONGEST_S
 
 
-class Bench:
-    """Owns the processes of one robot. `run` executes a command that an operator would type."""
+class Bench(LocalRobot):
+    """`run` executes a command that an operator would type."""
 
     def __init__(self, folder: Path, logs: Path) -> None:
+        super().__init__(folder, logs)
         self.folder, self.logs = folder, logs
-        self.socket = folder / "mudskipper.sock"
-        self.configuration = write_local_setup(folder, logs)
-        self.robot = self.start("command_line.main", "simulate")
-        self.daemon = self.start("firmware_host.daemon")
-
-    def start(self, module: str, *options: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", module, *options, "--config", str(self.configuration)]
-        return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return run(*arguments, MUDSKIPPER_SOCKET=str(self.socket))
@@ -39,15 +31,10 @@ class Bench:
         deadline_s = time.monotonic() + longest_s
         report: dict[str, Any] = {}
         while time.monotonic() < deadline_s:
-            try:
-                client = StatusClient(self.socket)
-            except NoDaemonError:
-                time.sleep(0.02)
-                continue
-            report = client.call("status")
-            client.close()
-            if done(report):
-                return report
+            with suppress(NoDaemonError), StatusClient(self.socket) as client:
+                report = client.call("status")
+                if done(report):
+                    return report
             time.sleep(0.02)
         raise AssertionError(f"never reached: {report.get('mode')} {report.get('fault')}")
 
@@ -56,19 +43,18 @@ class Bench:
 
     def reset(self) -> None:
         """Clears the failures, torque, joint positions beyond limits and faults that the previous test left."""
-        client = StatusClient(self.socket)
-        client.call("fail", component="all", kind="ok")
-        client.call("disarm")
-        self.wait_for(lambda report: report["mode"] in ("idle", "fault"))
-        self.robot.send_signal(signal.SIGUSR1)  # moves the joints back
-        with suppress(CallRefusedError):  # refused while joints are beyond their limits
-            client.call("clear")
-        self.wait_for(lambda report: report["mode"] in ("idle", "fault") and not report["failing"])
-        while client.call("status")["fault"]:
-            with suppress(CallRefusedError):
+        with StatusClient(self.socket) as client:
+            client.call("fail", component="all", kind="ok")
+            client.call("disarm")
+            self.wait_for(lambda report: report["mode"] in ("idle", "fault"))
+            self.robot.send_signal(signal.SIGUSR1)  # moves the joints back
+            with suppress(CallRefusedError):  # refused while joints are beyond their limits
                 client.call("clear")
-            time.sleep(0.05)
-        client.close()
+            self.wait_for(lambda report: report["mode"] in ("idle", "fault") and not report["failing"])
+            while client.call("status")["fault"]:
+                with suppress(CallRefusedError):
+                    client.call("clear")
+                time.sleep(0.05)
         self.wait_until_ready()
 
     def stop_daemon(self) -> Path:
@@ -78,17 +64,7 @@ class Bench:
         return max((self.logs / "done").glob("*.mcap"))
 
     def restart_daemon(self) -> None:
-        assert self.daemon.stderr is not None
-        self.daemon.stderr.close()
-        self.daemon = self.start("firmware_host.daemon")
-
-    def end(self) -> None:
-        for process in (self.daemon, self.robot):
-            if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-                process.wait(LONGEST_S)
-            assert process.stderr is not None
-            process.stderr.close()
+        self.daemon = self._start("firmware_host.daemon")
 
 
 @contextmanager

@@ -28,10 +28,10 @@ def _prepare_child(blocked_before: set[int | signal.Signals]) -> None:
 class LocalRobot:
     """Owns the two processes."""
 
-    def __init__(self, folder: Path, logs: Path, seed: int, world: Path | None = None, text: str = "") -> None:
+    def __init__(self, folder: Path, logs: Path, seed: int = 1, world: Path | None = None, text: str = "") -> None:
         """`text`: of the daemon's configuration (default: that of the simulated robot)."""
         self.socket = folder / "mudskipper.sock"
-        self._configuration = write_local_setup(folder, logs, text)
+        self.configuration = write_local_setup(folder, logs, text)
         self._output = (folder / "output.txt").open("w+", encoding="utf-8", errors="replace")
         ground = () if world is None else ("--world", str(world))
         self.robot = self._start("command_line.main", "simulate", "--seed", str(seed), *ground)
@@ -45,7 +45,7 @@ class LocalRobot:
         blocked_before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         try:
             return subprocess.Popen(
-                [sys.executable, "-P", "-m", module, *arguments, "--config", str(self._configuration)],
+                [sys.executable, "-P", "-m", module, *arguments, "--config", str(self.configuration)],
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=self._output,

@@ -11,10 +11,8 @@ from tests.running_bench import Bench
 def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Path) -> None:
     own_bench.stop_daemon()
     configuration = parse_configuration(own_bench.configuration.read_text(encoding="utf-8"))
-    with running_daemon(configuration, tmp_path) as socket:
-        client = StatusClient(socket)
+    with running_daemon(configuration, tmp_path) as socket, StatusClient(socket) as client:
         assert client.call("status")["robot"] == "simulated"
-        client.close()
     assert not socket.exists()
     own_bench.restart_daemon()
     own_bench.wait_until_ready()
