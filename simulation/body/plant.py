@@ -11,12 +11,12 @@ the stiffest of the paper's muds, makes the arm swing at about 400 rad/s.
 """
 
 from itertools import chain
-from math import copysign, radians, sin
+from math import radians, sin
 from operator import add
 from random import Random
 
 from control.records import JointAngles, Joints, Torques
-from simulation.body.belt import Belt
+from simulation.body.belt import Belt, slowed
 from simulation.body.bench_mount import BenchMount
 from simulation.body.free_body import FreeBody
 from simulation.body.plant_parameters import PlantParameters
@@ -184,21 +184,16 @@ class Arm:
         self.sweep_velocity_rad_s += dt_s * sweep_nm / sweep_inertia_kg_m2
         self.adduction_velocity_rad_s += dt_s * lift_nm / lift_inertia_kg_m2
         if sweep_dry_nm:
-            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
+            self.sweep_velocity_rad_s = slowed(self.sweep_velocity_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
         if lift_dry_nm:
             loss_rad_s = dt_s * lift_dry_nm / lift_inertia_kg_m2
-            self.adduction_velocity_rad_s = _slowed(self.adduction_velocity_rad_s, loss_rad_s)
+            self.adduction_velocity_rad_s = slowed(self.adduction_velocity_rad_s, loss_rad_s)
         self.sweep_rad, self.sweep_velocity_rad_s = _moved(
             self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
         )
         self.adduction_rad, self.adduction_velocity_rad_s = _moved(
             self.adduction_rad, self.adduction_velocity_rad_s, dt_s, END_STOPS_RAD[1]
         )
-
-
-def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
-    """Return the velocity after dry friction, which stops the joint but never reverses it."""
-    return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
 
 
 def _moved(angle_rad: float, velocity_rad_s: float, dt_s: float, stop_rad: float) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import pytest
 
 from control.parameters.arm_mass import ArmMass
 from control.records import Joints
-from simulation.body.belt import STIFFNESS_NM_RAD, Belt
+from simulation.body.belt import FRICTION_NM, STIFFNESS_NM_RAD, Belt
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.disturbances import Disturbances
@@ -20,7 +20,7 @@ class TwoBodies:
     """A rotor and an arm without friction, joined by a belt."""
 
     def __init__(self, play_rad: float = PLAY_RAD) -> None:
-        self.belt = Belt(play_rad, INERTIA_KG_M2)
+        self.belt = Belt(play_rad, INERTIA_KG_M2, friction_nm=0.0)
         self.arm_kg_m2 = INERTIA_KG_M2 - self.belt.rotor_kg_m2
         self.angle_rad = self.velocity_rad_s = 0.0
 
@@ -63,6 +63,16 @@ def test_a_rattling_belt_gains_no_energy(dt_s: float) -> None:
     bodies.belt.velocity_rad_s = 5.0
     energies_j = [bodies.energy_j for _ in range(round(1.0 / dt_s)) if bodies.step(dt_s) < 1e9]
     assert max(energies_j) <= 1.001 * 0.5 * bodies.belt.rotor_kg_m2 * 25.0
+
+
+def test_a_rotor_that_is_left_alone_stops_within_its_play() -> None:
+    belt = Belt(PLAY_RAD, INERTIA_KG_M2)
+    belt.velocity_rad_s = 0.1
+    stopping_s = 0.1 * belt.rotor_kg_m2 / FRICTION_NM
+    for _ in range(round(2.0 * stopping_s / 0.0001)):
+        assert belt.transmit(0.0001, 0.0, 0.0, 0.0) == 0.0
+    assert belt.velocity_rad_s == 0.0
+    assert belt.angle_rad == pytest.approx(0.1 * stopping_s / 2.0, rel=0.05)
 
 
 def test_the_encoders_are_at_the_motors() -> None:
