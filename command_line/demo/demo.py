@@ -66,12 +66,11 @@ def demo(
             with TemporaryDirectory(prefix="mudskipper-", ignore_cleanup_errors=True) as files:
                 report, strides = _perform(LocalRobot(Path(files), out, seed, world), track, depth)
             summary = _conclude(out, report, strides, track)
-    except KeyboardInterrupt as problem:
+    except (KeyboardInterrupt, NoDaemonError, CallRefusedError, TimeoutError, RuntimeError) as problem:
         for path in sorted(set(log_files(out, DONE)) - before):
-            print(f"\nlog      {path}")
-        raise CommandError(str(problem) or "stopped", status=exit_codes.INTERRUPTED) from None
-    except (NoDaemonError, CallRefusedError, TimeoutError, RuntimeError) as problem:
-        raise CommandError(str(problem)) from None
+            print(f"\nlog      {path}", file=sys.stderr if json else sys.stdout)
+        status = exit_codes.INTERRUPTED if isinstance(problem, KeyboardInterrupt) else exit_codes.UNHEALTHY
+        raise CommandError(str(problem) or "stopped", status=status) from None
     return Answer(summary, "", schema="demo")
 
 
@@ -95,7 +94,12 @@ def _perform(robot: LocalRobot, track: Track, depth_cm: float | None) -> tuple[R
             state = "stopped: torque is off, the log is closed"
             client.arm()
             client.wait_for("hold")
-            return _walk(robot, client, track, depth_cm)
+            try:
+                return _walk(robot, client, track, depth_cm)
+            except RuntimeError as fault:
+                missed = client.status()["loop"]["missed_ticks"]
+                busy = f"The loop missed {missed} ticks: if that is more than a few, this computer was too busy"
+                raise RuntimeError(f"{fault} {busy}; close other programs and try again.") from None
     except KeyboardInterrupt:
         robot.end()
         if status := robot.daemon.returncode:

@@ -29,5 +29,5 @@ def value_shown(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{name} {value_shown(each)}" for name, each in value.items()) or "-"
     if isinstance(value, float):
-        return f"{value:.2f}".removesuffix(".00") if abs(value) >= 100.0 else f"{value:.4g}"
+        return f"{value:.2f}".removesuffix(".00") if abs(value) >= 100.0 else f"{value:z.4g}"
     return "-" if value in (None, "") else str(value)

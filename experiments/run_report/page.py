@@ -352,7 +352,7 @@ def _comparison_sentences(
 ) -> list[str]:
     """Say how fast each run was, and how many differences are larger than their uncertainty."""
     named = list(zip(labels.values(), headlines, strict=True))
-    known = [f"{name} {each['speed_m_s'] / CM:.1f} cm/s" for name, each in named if each["speed_m_s"] is not None]
+    known = [f"{name} {each['speed_m_s'] / CM:z.1f} cm/s" for name, each in named if each["speed_m_s"] is not None]
     empty = [name for name, each in named if not each["strides"]]
     shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {labels[runs[0].name]}"
     return [

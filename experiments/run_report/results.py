@@ -182,7 +182,7 @@ def _travel_sentence(headline: Entry) -> str:
     if headline["speed_m_s"] is None:
         return "The log has no position of the body: distance, speed and slip are not known."
     walks = f" in {headline['walks']} walks" if headline["walks"] > 1 else ""
-    speed = f"{100.0 * headline['speed_m_s']:.1f} cm/s"
+    speed = f"{100.0 * headline['speed_m_s']:z.1f} cm/s"
     return f"The robot walked {headline['distance_m']:.2f} m in {headline['duration_s']:.1f} s{walks}: {speed}."
 
 

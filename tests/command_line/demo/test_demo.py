@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -91,6 +93,25 @@ def test_ctrl_c_in_a_walk_over_the_three_muds_stops_the_robot_and_closes_the_log
     modes = [event["text"] for event in log.events if event["text"].startswith("mode ")]
     assert log.complete and modes[-1] == "mode hold to idle"
     assert children_of(out) == []
+
+
+def test_a_daemon_that_stood_still_ends_the_demo_with_the_missed_ticks_and_the_log(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with start_demo(out) as demo:
+        assert demo.stdout is not None
+        shown = next(line for line in demo.stdout if line.startswith("left "))
+        children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text(encoding="ascii").split()
+        lines = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children}
+        (daemon,) = (pid for pid, line in lines.items() if b"firmware_host.daemon" in line)
+        os.kill(daemon, signal.SIGSTOP)
+        time.sleep(1.0)  # the watchdogs of the drives expire
+        os.kill(daemon, signal.SIGCONT)
+        printed, complaints = demo.communicate(timeout=LONGEST_S)
+    assert demo.returncode == exit_codes.UNHEALTHY
+    (path,) = (out / "done").glob("*.mcap")
+    assert str(path) in shown + printed
+    missed = re.search(r"missed (\d+) ticks", complaints)
+    assert missed and int(missed[1]) >= 300
 
 
 @pytest.mark.parametrize(("number", "line"), [(signal.SIGINT, ""), (signal.SIGTERM, "Arming")])
