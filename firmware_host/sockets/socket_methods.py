@@ -15,7 +15,7 @@ from control.records import JOINTS
 from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
 from drivers.fault_injection.failures import USUAL_S
-from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.rpc import LONGEST_ARRAY, RefusedError
 from firmware_host.trial import KEYS as TRIAL_KEYS
 from firmware_host.trial import LONGEST_VALUE
 
@@ -165,7 +165,10 @@ DEPTH = Parameter(
     null_is_default=True,
 )
 DEPTHS = DEPTH._replace(
-    name="depths_m", type=Type.NUMBERS, meaning="fixed depths of the strides in turn, in place of depth_m"
+    name="depths_m",
+    type=Type.NUMBERS,
+    meaning="fixed depths of the strides in turn, in place of depth_m",
+    longest=LONGEST_ARRAY,
 )
 GAIT_FILE = Parameter(
     "gait",

@@ -52,7 +52,7 @@ def test_bytes_that_are_no_messagepack_end_the_connection(served: Served, data: 
 
 @pytest.mark.parametrize(
     "value",
-    [nan, inf, -inf, [1], NESTED, {"b": 1}, b"raw", msgpack.ExtType(5, b"abc"), msgpack.Timestamp(1, 2)],
+    [nan, inf, -inf, [[1]], [1.0, nan], NESTED, {"b": 1}, b"raw", msgpack.ExtType(5, b"abc"), msgpack.Timestamp(1, 2)],
     ids=lambda value: f"{type(value).__name__} {str(value)[:3]}",
 )
 def test_a_param_that_is_no_plain_value_is_refused_with_its_name(served: Served, value: Any) -> None:
@@ -65,7 +65,7 @@ def test_a_param_that_is_no_plain_value_is_refused_with_its_name(served: Served,
 
 
 @pytest.mark.parametrize(
-    "value", [2**64 - 1, -(2**63), "x" * 3000, True, None, 1e308], ids=lambda value: str(value)[:9]
+    "value", [2**64 - 1, -(2**63), "x" * 3000, True, None, 1e308, [0.02, 3] * 4], ids=lambda value: str(value)[:9]
 )
 def test_plain_values_arrive_as_they_are(served: Served, value: Any) -> None:
     ((_, _, error, result),) = ask(served, connect(served), msgpack.packb([0, 2**64 - 1, "echo", {"a": value}]))
@@ -81,7 +81,7 @@ def test_params_that_are_no_map_from_names_are_refused(served: Served, params: A
 
 
 @pytest.mark.parametrize(
-    "header", [b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\x81\xa1a", b"\x94"], ids=bytes.hex
+    "header", [b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\x81\xa1a", b"\x94", b"\x98"], ids=bytes.hex
 )
 def test_headers_that_announce_long_data_take_no_memory(served: Served, header: bytes) -> None:
     """A thousand nested headers, each for 8192 elements, would make an unbounded unpacker take 65 MB."""
