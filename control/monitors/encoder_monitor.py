@@ -19,7 +19,6 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
 MOVED_S = 0.02  # drives repeat an old value now and then
-STEADY_RAD_S = 0.5  # change of the speed between two messages, twice in a row: a peak may lie between two alike
 LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path, nor equal angles rest
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
@@ -40,7 +39,6 @@ class EncoderMonitor:
 
     def reset(self) -> None:
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
-        self._steady = False  # the speed, over the last two messages
         self._reset_frozen()
         self._speed.reset()
         self._begin_interval()
@@ -79,8 +77,6 @@ class EncoderMonitor:
         angle_rad, velocity_rad_s = state.angle_rad, state.velocity_rad_s
         step_rad = angle_rad - self._angle_rad
         path_rad = (velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s
-        steady, was_steady = abs(velocity_rad_s - self._velocity_rad_s) < STEADY_RAD_S, self._steady
-        self._steady = steady
         fault = None
         if gap_s > LONGEST_GAP_S:  # also that before the first message
             self._reset_frozen()
@@ -94,7 +90,7 @@ class EncoderMonitor:
                 self._reset_frozen()
         if gap_s > PUNCTUAL_S:
             self._begin_interval(after_s=INTERVAL_S)  # the messages that were held up come in a burst
-        elif not fault and gap_s > 0.0 and steady and was_steady:
+        elif not fault and gap_s > 0.0:
             self._interval_s += gap_s
             if self._interval_s > 0.0:
                 self._path_rad += path_rad

@@ -10,10 +10,6 @@ magnet or belt slips leaves the slope as it is and adds the offset, at any motio
 
 An offset comes from rounding as well: one step of a 12-bit code of ±65 rad/s is 0.032 rad/s, and half of it, over the
 time constant of the leak, 0.08 rad. A slip of 0.05 rad/s gathers up to 0.25 rad, and passes half of that after 3.5 s.
-
-A rotor that hits the end of its belt's play changes its speed within a message, in one direction more than in the other
-while a recovery rocks it: by 0.3 rad in 4 s. Two speeds do not determine such a path, so only time in which the speed
-is steady counts. A slip that lasts gathers in that time as well.
 """
 
 from control.faults import Fault, FaultKind
