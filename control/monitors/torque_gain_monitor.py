@@ -33,6 +33,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from control.computing.exact_sum import exact_sum
 from control.faults import Fault, FaultKind
 from control.gait.recovery import lowest_point_m
 from control.geometry import FlipperGeometry
@@ -65,10 +66,11 @@ class Moments(NamedTuple):
     @classmethod
     def of(cls, blocks: Sequence[Block]) -> "Moments":
         """Return those of a stroke."""
-        u, m = map(sum, zip(*blocks, strict=True))
+        u, m = map(exact_sum, zip(*blocks, strict=True))
         n = len(blocks)
         about = [(a - u / n, b - m / n) for a, b in blocks]
-        return cls(n, sum(a * a for a, _ in about), sum(a * b for a, b in about), sum(b * b for _, b in about))
+        products = zip(*((a * a, a * b, b * b) for a, b in about), strict=True)
+        return cls(n, *map(exact_sum, products))
 
     def plus(self, other: "Moments") -> "Moments":
         return Moments(self.blocks + other.blocks, self.uu + other.uu, self.um + other.um, self.mm + other.mm)
@@ -143,7 +145,7 @@ class JointStrokes:
         blocks, joins = self._stroke, self._joins
         if len(blocks) > joins:
             rows = zip(*[iter(blocks)] * joins, strict=False)
-            joined = [(sum(u for u, _ in row) / joins, sum(m for _, m in row) / joins) for row in rows]
+            joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
             self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined)))
         blocks.clear()
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from statistics import median
+from typing import Any
 
 import pytest
+import tomlkit
 
 from control.controller import WalkOrder
 from control.faults import FaultKind
@@ -27,14 +29,12 @@ STRIDES = 3
 
 def mixed(other_type: str) -> str:
     """Return the configuration with a left flipper of ODrives and a right one of another type."""
-    left, right = EXAMPLE.split("[bus.right]")
-    other = with_drive_type(EXAMPLE, other_type).split("[bus.right]")[1]
+    document: dict[str, Any] = tomlkit.parse(with_drive_type(EXAMPLE, other_type))
+    own: dict[str, Any] = tomlkit.parse(EXAMPLE)
+    document["bus"]["left"] = own["bus"]["left"]
     for joint in ("left_sweep", "left_adduction"):
-        section = f"[drive.{joint}]"
-        own = right[right.index(section) : right.index("\n\n", right.index(section))]
-        replaced = other[other.index(section) : other.index("\n\n", other.index(section))]
-        other = other.replace(replaced, own)
-    return left + "[bus.right]" + other
+        document["drive"][joint] = own["drive"][joint]
+    return tomlkit.dumps(document)
 
 
 def robot_with(text: str, **changes: float | str) -> Lockstep:
