@@ -255,7 +255,8 @@ def examine_pose(configuration: Configuration) -> list[Finding]:
     while not isfinite(pose.read(time.monotonic()).x_m) and time.monotonic() < deadline_s:
         time.sleep(0.01)
     pose.close()
-    return [ok("pose", pose.report().message)]
+    report = pose.report()
+    return [ok_if(not report.trouble, "pose", report.message, report.what_to_do)]
 
 
 def _examine_means(configuration: Configuration) -> Iterator[Finding]:

@@ -20,7 +20,7 @@ class Finding(NamedTuple):
 
     @property
     def as_check_item(self) -> dict[str, Any]:
-        return check_item(self.id, self.level is not Level.FAIL, self.text, self.fix)
+        return check_item(self.id, self.level is not Level.FAIL, self.text, self.fix, warns=self.level is Level.WARN)
 
 
 def ok(identity: str, text: str) -> Finding:

@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.errors import CommandError
+from command_line.errors import CommandError, usage_error
 from command_line.json_output import Answer
 from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, Report
-from command_line.screen import GREEN, RED, coloured, complain
+from command_line.screen import GREEN, RED, YELLOW, coloured, complain
 from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
 from control.computing.suggestion import suggestion
 from control.records import JOINTS
 from drivers.can.run_folder import find_run_folder
 from experiments.study.option import Option
+from firmware_host.sockets.rpc import LONGEST_ARRAY
 from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, StatusClient
 
 ARMING_S = 5.0
@@ -28,6 +29,7 @@ WAITING_S = 30.0
 BEYOND_RANGE = "joint_position"  # a fault
 LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
+OVERRULE = "; or overrule it with 'mudskipper arm --force CHECK'"
 
 TakeOver: TypeAlias = Annotated[bool, Option("take the lease from a program that holds it")]
 
@@ -82,6 +84,8 @@ def walk(
 
     A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
     """
+    if len(depth) > LONGEST_ARRAY:
+        raise usage_error(f"--depth is given {len(depth)} times; at most {LONGEST_ARRAY} depths take turns")
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
     described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
     described["water"] = "" if water is None else f"{water:g}"
@@ -236,11 +240,13 @@ def check(
 
 def _check_text(item: Report, following: list[str]) -> str:
     """Format one item, and name those that follow from it."""
-    mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
+    mark = coloured("warn", YELLOW) if item["warning"] else coloured("ok  ", GREEN)
+    if not item["ok"]:
+        mark = coloured("FAIL", RED)
     lines = [f"{mark} {item['id']:24} {item['text']}"]
     if following:
         lines.append(f"       and from the same cause: {', '.join(following)}")
-    if item["fix"] and not item["ok"]:
-        overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force CHECK'"
-        lines.append(f"       -> {item['fix']}{overruled}")
+    if item["fix"]:
+        stays = item["ok"] or item.get("mandatory", True)
+        lines.append(f"       -> {item['fix']}{'' if stays else OVERRULE}")
     return "\n".join(lines)

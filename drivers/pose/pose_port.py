@@ -37,13 +37,9 @@ class PoseReport(NamedTuple):
 
     @property
     def message(self) -> str:
-        """One line; trouble is only a warning, because the robot also walks without a pose."""
-        counted = (
-            f"{self.source}: {self.poses} poses, {self.malformed} malformed messages, {self.lost} without the body"
-        )
-        if not self.trouble:
-            return counted
-        return f"warning: {self.trouble} {self.what_to_do[:1].upper()}{self.what_to_do[1:]}. {counted}"
+        """One line. Trouble is only a warning, because the robot also walks without a pose."""
+        counted = f"{self.poses} poses, {self.malformed} malformed messages, {self.lost} without the body"
+        return f"{self.trouble} {self.source}: {counted}".lstrip()
 
 
 NO_SOURCE = PoseReport()

@@ -179,10 +179,10 @@ class LogSegments:
             self._file.abandon()
             self._file = None
         reason = error.strerror or str(error)
-        self.problem = f"The log {self.path} cannot be written: {reason}."
+        self.problem = f"{self.path}: {reason}."
         if reason != self._reason:
             with suppress(OSError):  # standard error may be a file on the same disk
-                print(self.problem, file=sys.stderr, flush=True)
+                print(f"The log cannot be written: {self.problem}", file=sys.stderr, flush=True)
         self._reason = reason
         self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         self._retry_s = time.monotonic() + RETRY_S

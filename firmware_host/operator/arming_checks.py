@@ -51,8 +51,10 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     for identity, text in lines.items():
         own = faults_of.get(identity, [])
         items.append(_line(identity, text, own, identity in unheard) | {"cause": _cause(identity, own, cause_lines)})
-    items += [check_item("configuration", True, f"warning: {each}", "") for each in loop.configuration.warnings]
-    return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
+        if identity == "pose" and pose.trouble and items[-1]["ok"]:
+            items[-1] |= {"warning": True, "fix": pose.what_to_do}
+    items += [check_item("configuration", True, each, "", warns=True) for each in loop.configuration.warnings]
+    return items + [check_item("realtime", True, warning, "", warns=True) for warning in warnings]
 
 
 def _cause_lines(faults: Sequence[AgedFault], configuration: Configuration) -> dict[Fault, str]:
@@ -78,8 +80,7 @@ def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> d
     reported = (blocking or list(faults))[:MESSAGES_PER_LINE]
     messages = " ".join(fault.message for fault in reported)
     fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in reported))
-    text = messages if blocking else f"warning: {messages}" if reported else text
-    item = check_item(identity, not blocking, text, fixes)
+    item = check_item(identity, not blocking, messages or text, fixes, warns=bool(reported) and not blocking)
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}
 
 

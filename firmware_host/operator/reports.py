@@ -68,9 +68,9 @@ def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
     return [{"place_m": row.position_m} | _coefficient_reports(row) for row in rows]
 
 
-def check_item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
-    """Return one line of `mudskipper check`, with the fix if it is not ok."""
-    return {"id": identity, "ok": ok, "text": text, "fix": "" if ok else fix}
+def check_item(identity: str, ok: bool, text: str, fix: str, *, warns: bool = False) -> dict[str, Any]:
+    """Return one line of `mudskipper check`, with the fix of what blocks arming or is a warning."""
+    return {"id": identity, "ok": ok, "warning": warns, "text": text, "fix": fix if warns or not ok else ""}
 
 
 def cause_report(cause: Cause) -> dict[str, Any]:

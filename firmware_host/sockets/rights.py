@@ -55,10 +55,9 @@ class Rights(NamedTuple):
 
 
 def _for_members(what: str, group: Group) -> str:
-    return (
-        f"{NOT_PERMITTED}{what} is {FOR_MEMBERS}{group.name}."
-        f" Have root run 'adduser YOU {group.name}', then log in again"
-    )
+    join = f"Have root run 'adduser YOU {group.name}', then log in again"
+    advice = join if group.gid else "Use sudo, or name another group in [status] of the configuration"
+    return f"{NOT_PERMITTED}{what} is {FOR_MEMBERS}{group.name}. {advice}"
 
 
 def read_peer(connection: socket.socket) -> Peer:

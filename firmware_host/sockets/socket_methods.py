@@ -296,8 +296,9 @@ METHODS: dict[str, SocketMethod] = {
         answer_keys={
             "id": "name of the item",
             "ok": "whether it permits arming",
+            "warning": "whether it permits arming and is still a reason to worry",
             "text": "its state",
-            "fix": "what to do if it is not ok",
+            "fix": "what to do if it is not ok or warns",
             "mandatory": "whether it also blocks arming by force",
             "cause": "the item that this one follows from, if there is one",
         },

@@ -22,6 +22,7 @@ WRONG_COMMAND_LINES = [  # and what the message names
     ("arm --f", "--f"),  # would overrule failed checks
     ("walk --depht 3", "did you mean --depth?"),
     ("walk --depth 3 --adaptive", "--adaptive"),
+    ("walk" + 9 * " --depth 3", "at most 8 depths take turns"),
     ("walk --strides 0", "--strides"),  # would walk without end
     ("walk --depth 2.0mm", "2.0mm: must be a number in cm"),
     ("walk --depth 0.02", "from 0.5 to 20 cm"),  # m

@@ -213,7 +213,8 @@ def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(robot:
     assert line["ok"] and line["text"] == "camera: 12 poses, 3 malformed messages, 4 without the body"
     source.reported = source.reported._replace(trouble="it is dark.", what_to_do="switch on the light")
     line = pose_line(robot)
-    assert line["ok"] and line["text"].startswith("warning: it is dark. Switch on the light. camera: 12 poses")
+    assert line["ok"] and line["warning"] and line["fix"] == "switch on the light"
+    assert line["text"].startswith("it is dark. camera: 12 poses")
 
 
 def test_a_source_is_opened_again_only_while_the_torque_is_off(robot: Lockstep) -> None:
@@ -236,5 +237,6 @@ def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) ->
         robot.run_for(0.3)
         assert not isfinite(robot.loop.body.x_m)
         assert "pose_lost" in {fault.name for fault in robot.loop.faults.present}
-        assert f"no pose arrives at {short_folder}/pose any more. Start" in pose_line(robot)["text"]
+        line = pose_line(robot)
+        assert line["warning"] and line["fix"] and f"no pose arrives at {short_folder}/pose any more" in line["text"]
         sender.close()

@@ -204,7 +204,7 @@ def test_a_path_that_cannot_be_made_is_reported_in_a_sentence(
     (tmp_path / "file").touch()
     recorder = Recorder(tmp_path / "file" / "run.mcap", "", {})
     assert not recorder.close(LONGEST_S)
-    assert capfd.readouterr().err == f"The log {recorder.path} cannot be written: Not a directory.\n"
+    assert capfd.readouterr().err == f"The log cannot be written: {recorder.path}: Not a directory.\n"
 
 
 def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -213,7 +213,7 @@ def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixtur
     recorder = Recorder(path, "", {})
     assert recorder.close(LONGEST_S)
     assert (path.read_text(), recorder.path.name) == ("precious", "run-0001.mcap")
-    assert capfd.readouterr().err == f"The log {path} cannot be written: File exists.\n"
+    assert capfd.readouterr().err == f"The log cannot be written: {path}: File exists.\n"
 
 
 def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -226,7 +226,7 @@ def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capf
     while not look(recorder).problem and time.monotonic() < deadline_s:
         put += recorder.put(TICK_KIND, make_tick(float(put)))
         time.sleep(0.003)
-    assert look(recorder).problem == f"The log {tmp_path / 'run.mcap'} cannot be written: File too large."
+    assert look(recorder).problem == f"{tmp_path / 'run.mcap'}: File too large."
     assert recorder.writer_alive
     unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, unlimited)

@@ -197,7 +197,7 @@ def test_a_log_removed_under_the_writer_is_noticed(tmp_path: Path, removed: str)
     log.write(make_ticks(0, 100))
     shutil.rmtree(folder / removed)
     log.write(make_ticks(100, 200))
-    assert log.problem.endswith("run-0000.mcap cannot be written: it was removed or moved away.")
+    assert log.problem.endswith("run-0000.mcap: it was removed or moved away.")
     assert log.dropped == 200
     log.write(make_ticks(200, 300))
     assert log.close()
@@ -253,7 +253,7 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     write = os.write
     monkeypatch.setattr(os, "write", full)
     log.write(make_ticks(10, 200))
-    assert log.problem.endswith("run-0000.mcap cannot be written: No space left on device.")
+    assert log.problem.endswith("run-0000.mcap: No space left on device.")
     assert log.dropped == 190
     monkeypatch.setattr(os, "write", write)
     log.write(make_ticks(200, 210))

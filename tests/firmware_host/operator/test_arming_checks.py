@@ -55,8 +55,8 @@ def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> Non
         line = lines[fault.check_line]
         assert line["ok"] == (kind.blocks is Blocks.NO), kind
         assert line["mandatory"] == (kind.blocks is Blocks.ALWAYS), kind
-        assert line["text"] == ("warning: " if line["ok"] else "") + fault.message
-        assert line["fix"] == ("" if line["ok"] else fault.kind.what_to_do)
+        assert line["warning"] == line["ok"], kind
+        assert (line["text"], line["fix"]) == (fault.message, fault.kind.what_to_do)
         assert all(each["ok"] for identity, each in lines.items() if identity != line["id"]), kind
 
 
@@ -89,7 +89,7 @@ def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) 
 
 def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) -> None:
     line = lines_of(ready, warnings=("no real-time priority",))["realtime"]
-    assert (line["ok"], line["text"]) == (True, "warning: no real-time priority")
+    assert (line["ok"], line["warning"], line["text"]) == (True, True, "no real-time priority")
 
 
 def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configuration: Configuration) -> None:
