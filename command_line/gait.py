@@ -67,8 +67,9 @@ def _configuration(config: Path | None) -> Configuration:
 def _phases(path: GaitPath, configuration: Configuration, depth_m: float) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("phase", "seconds", "sweep (degrees)", "depth (cm)", "for the estimator")]
     for row in stride_table(path, configuration.geometry, depth_m):
-        sweep = f"{degrees(row.sweep_start_rad):.1f} to {degrees(row.sweep_end_rad):.1f}"
-        depth = f"{100.0 * row.depth_start_m:.2f} to {100.0 * row.depth_end_m:.2f}"
+        fractions = (0.0, 0.5, 1.0) if row.sweep_bulge_rad or row.depth_bulge_m else (0.0, 1.0)
+        sweep = " to ".join(f"{degrees(row.at(fraction)[0]):z.1f}" for fraction in fractions)
+        depth = " to ".join(f"{100.0 * row.at(fraction)[1]:z.2f}" for fraction in fractions)
         rows.append((path.phase[row.number].name, f"{row.duration_s:.3f}", sweep, depth, row.phase.name.lower()))
     return rows
 

@@ -13,7 +13,8 @@ STANCE = '[[phase]]\nname = "stance"\nspeed_m_s = 0.3\nway_points = [{ sweep_deg
 
 def test_a_gait_that_is_checked_is_drawn(tmp_path: Path) -> None:
     picture = tmp_path / "path.png"
-    assert run("gait", "check", "ellipse", "--out", str(picture)).returncode == exit_codes.OK
+    checked = run("gait", "check", "ellipse", "--out", str(picture))
+    assert checked.returncode == exit_codes.OK and "-0.72 to 3.00 to -0.72" in checked.stdout  # cm, under the body
     assert picture.stat().st_size > 10_000
 
 
