@@ -135,7 +135,7 @@ def _current_problems(pose: Pose, lift_rad: float, configuration: Configuration,
         if torque_nm > largest_a * constant_nm_a:
             yield (
                 f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor, must be at most"
-                f" {largest_a:.1f} A ({largest_a * constant_nm_a:.2f} N·m)"
+                f" {largest_a:.1f} A ({largest_a * constant_nm_a:.2f} N·m); a smaller depth takes less"
             )
 
 
