@@ -105,11 +105,12 @@ class Odrive05Axis(CanSimpleAxis):
         turns = count / self.parameters.encoder_counts
         if not self._counts_known:
             self._counts_known, self._health = True, None
-        if not self._absent:
-            self._compare_counts(count, turns)
-        elif self._proof.concluded or self._error_flags:
+        uses_counts = self._absent and (self._proof.concluded or self._error_flags)
+        if uses_counts:
             turns_s = self._turns_s(turns - self._turns, now_s - self._counted_s)
             super()._receive_encoder(GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
+        if uses_counts or not self._absent:
+            self._compare_counts(count, turns)
         self._turns, self._counted_s = turns, now_s
 
     def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:
@@ -169,7 +170,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._ask()
 
     def poll(self) -> None:
-        """Ask an idle drive for its counts while it reports no position, or its watchdog is not proven.
+        """Ask an idle drive for its counts while it reports no position, or another one, or its watchdog is not proven.
 
         A drive with firmware 0.6 has none, and reports its version.
         """
@@ -181,7 +182,7 @@ class Odrive05Axis(CanSimpleAxis):
         if self._proof.must_clear:
             self._proof.begin_again()
             super().clear_errors()
-        if self._absent or not self._proof.concluded:
+        if self._absent or self._counts_problem or not self._proof.concluded:
             self._outlet.send(self._counts_request)
 
     def prepare(self) -> None:

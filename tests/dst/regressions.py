@@ -336,4 +336,14 @@ REGRESSIONS = (
             for_s=0.521,
         ),
     ),
+    Regression(
+        "a count that did not fit a garbled position was never asked for again, so arming stayed refused",
+        Scenario(
+            seed=8301048,
+            surroundings=Surroundings(seed=0, drive_type="odrive05"),
+            start="power-on",
+            events=(Failure(at_s=0.234, component="left_adduction", kind="garbage", for_s=0.553),),
+            for_s=1.037,
+        ),
+    ),
 )

@@ -331,6 +331,21 @@ def test_counts_that_do_not_fit_the_position_name_the_key(bench: Bench) -> None:
         bench.counts = round(1.5 * 4000)
 
 
+@pytest.mark.parametrize("estimates", [(1.5, 0.0), (0.0, 0.0)])
+def test_a_garbled_position_or_count_is_no_problem_once_they_fit_again(
+    bench: Bench, estimates: tuple[float, float]
+) -> None:
+    bench.estimates, bench.counts = estimates, round(estimates[0] * 8192)
+    bench.run()
+    assert bench.health.watchdog_s == 0.1 and bench.health.setting_problem == ""
+    bench.report(codec.GET_ENCODER_ESTIMATES, 1e30, 0.0)
+    bench.report(codec05.GET_ENCODER_COUNT, bench.counts, 0)
+    bench.read()
+    assert bench.health.setting_problem
+    bench.run()
+    assert bench.health.setting_problem == ""
+
+
 def test_a_restart_forgets_what_was_proven(bench: Bench) -> None:
     bench.run()
     for _ in range(200):
