@@ -20,6 +20,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
 MOVED_S = 0.02  # drives repeat an old value now and then
 LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path, nor equal angles rest
+HIT_RAD_S2 = 2000.0  # more than full torque accelerates a whole joint: its rotor is in the play of a belt, or hits
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
@@ -45,7 +46,7 @@ class EncoderMonitor:
 
     def _begin_interval(self, after_s: float = 0.0) -> None:
         """Begin the sums of speed_monitor.py, after a time in which messages do not count."""
-        self._interval_s, self._path_rad, self._turned_rad = -after_s, 0.0, 0.0
+        self._interval_s, self._path_rad, self._turned_rad, self._jumps_rad = -after_s, 0.0, 0.0, 0.0
 
     def _reset_frozen(self) -> None:
         self._repeated = False  # the newest angle, since the sums below began
@@ -95,8 +96,11 @@ class EncoderMonitor:
             if self._interval_s > 0.0:
                 self._path_rad += path_rad
                 self._turned_rad += step_rad
+                jump_rad_s = abs(velocity_rad_s - self._velocity_rad_s)
+                if jump_rad_s > HIT_RAD_S2 * gap_s:
+                    self._jumps_rad += jump_rad_s / 2.0 * gap_s
             if self._interval_s >= INTERVAL_S:
-                fault = self._speed.update(self._interval_s, self._path_rad, self._turned_rad)
+                fault = self._speed.update(self._interval_s, self._path_rad, self._turned_rad, self._jumps_rad)
                 self._begin_interval()
         self._angle_rad, self._velocity_rad_s, self._stamp_s = angle_rad, velocity_rad_s, stamp_s
         return fault

@@ -67,3 +67,21 @@ def test_messages_that_are_held_up_and_come_in_a_burst_are_no_slip() -> None:
         stamp_s = max(stamp_s + 5e-5, now_s + late_s)
         state = DriveState(sin(pi * now_s), pi * cos(pi * now_s), angle_stamp_s=stamp_s)
         assert encoder.update(state, MESSAGE_S) is None, now_s
+
+
+@pytest.mark.parametrize("hit_fraction", [0.4, 0.6])
+@pytest.mark.parametrize(("slip_rad_s", "name"), [(0.0, ""), (0.4, "encoder_slips"), (-0.4, "encoder_slips")])
+def test_a_rotor_that_hits_the_end_of_its_play_is_no_slip(slip_rad_s: float, name: str, hit_fraction: float) -> None:
+    """It is thrown for five messages, hits the other end at the same place between two messages, and returns in 34."""
+    encoder, names, thrown_rad_s = EncoderMonitor("left_sweep", 0.05), set(), 14.0
+    back_rad_s = thrown_rad_s * (2.5 + hit_fraction) / (34.5 - hit_fraction)
+    hit_rad_s = thrown_rad_s * hit_fraction - back_rad_s * (1.0 - hit_fraction)  # mean speed of that message
+    thrown = [(thrown_rad_s * (k - 0.5) / 5.0, thrown_rad_s * k / 5.0) for k in range(1, 6)]
+    cycle = [*thrown, (hit_rad_s, -back_rad_s), *33 * [(-back_rad_s, -back_rad_s)], (-back_rad_s / 2.0, 0.0)]
+    angle_rad = 0.0
+    for number in range(4000):
+        mean_rad_s, speed_rad_s = cycle[number % len(cycle)]
+        angle_rad += (mean_rad_s + slip_rad_s) * MESSAGE_S
+        fault = encoder.update(DriveState(angle_rad, speed_rad_s, number * MESSAGE_S), MESSAGE_S)
+        names |= {fault.name} if fault else set()
+    assert names == ({name} if name else set())
