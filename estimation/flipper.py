@@ -280,7 +280,8 @@ class FlipperEstimator(StrideEstimator):
     def _learn_stride(self, stride: ClosingStride) -> Work[Learned]:
         """Fit k_s and k_e; the next stride may have begun, so no state of the stride under way is read."""
         stance, extraction, surface = stride.stance, stride.extraction, stride.surface
-        shear = find_shear(self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n, stride.along_path)
+        known = self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n, stride.along_path
+        shear = yield from find_shear(*known)
         yield
         rising = extraction.moving()
         if stride.along_path and self.base is Base.FREE and shear.fit is not None:
@@ -288,6 +289,7 @@ class FlipperEstimator(StrideEstimator):
         k_e = yield from self._learn_extraction(stride, rising)
         yield
         force_n, force_error_n = yield_force_n(self.geometry, stance.batches, shear, stride.friction_error_nm)
+        yield
         self.fits = self.fits._replace(
             k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
             k_e=partial(extraction_samples, self.geometry, rising, surface, extraction.first_m),

@@ -19,6 +19,7 @@ from enum import Enum
 from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
+from control.computing.bounded_work import Work
 from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate_integrals import moment_width_m, stance_moment_m4, submerged_plate
@@ -63,12 +64,13 @@ def find_shear(
     base: Base,
     drag_n: float,
     along_path: bool = False,
-) -> Shear:
-    """Fit k_s, or find a lower bound, from the batches of one stance; `drag_n` is the body's drag on each flipper.
+) -> Work[Shear]:
+    """Fit k_s, or find a lower bound, in bounded units; `drag_n` is the body's drag on each flipper.
 
     A path goes through all depths. Mud seems the firmer the shallower a plate is, so a bound is that of its deep part.
     """
     moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
+    yield
     least_m4 = DEEP_FRACTION**2 * max(moments, default=0.0) if along_path else 0.0
     held = [moment if moment >= least_m4 else 0.0 for moment in moments]
     if not any(moment > 0.0 for moment in moments):

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate_integrals import stance_moment_m4, submerged_plate
 from estimation.strokes.origin_fit import MIN_BATCHES, fit_through_origin
@@ -76,7 +77,7 @@ def shaken(batches: Sequence[Batch], fraction: float) -> list[Batch]:
 
 
 def found(batches: Sequence[Batch], base: Base = Base.FREE, drag_n: float = DRAG_N, surface_m: float = 0.0) -> Shear:
-    return find_shear(GEOMETRY, batches, surface_m, base, drag_n)
+    return finish(find_shear(GEOMETRY, batches, surface_m, base, drag_n))
 
 
 def k_of(shear: Shear) -> float:
@@ -188,7 +189,7 @@ def test_the_slip_is_the_path_back_through_the_mud() -> None:
 def test_the_yield_force_needs_no_surface_and_no_depth(depth_m: float) -> None:
     batches = [batch._replace(sweep_nm=0.48) for batch in pressed(poses(depth_m=depth_m))]
     for surface_m in (-0.004, 0.0, 0.004):
-        shear = find_shear(GEOMETRY, batches, surface_m, Base.FIXED, 1.25)
+        shear = found(batches, Base.FIXED, surface_m=surface_m)
         force_n, error_n = yield_force_n(GEOMETRY, batches, shear, 0.01)
         assert force_n == pytest.approx(0.48 / LENGTH_M)
         assert error_n == pytest.approx(hypot(0.01, TORQUE_REPEATABILITY * 0.48) / LENGTH_M)
