@@ -184,7 +184,7 @@ class Estimate(NamedTuple):
     at_least: bool = False  # the mud did not yield: the value is a lower bound
     repeatability: float = UNKNOWN  # N/m³
     depth_m: float = UNKNOWN  # deepest point of the stroke below the mud's surface
-    speed_m_s: float = UNKNOWN  # of the flipper in the stroke
+    speed_m_s: float = UNKNOWN  # of the flipper in the stroke; of k_s through the mud
 
 
 @dataclass(frozen=True, slots=True)

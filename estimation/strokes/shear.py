@@ -55,6 +55,7 @@ class Shear(NamedTuple):
     reason: str = ""
     moment_m4: float = inf  # mean Ψ of the batches that count, by which an error of the torque becomes one of k_s
     steady: Sequence[int] = ()  # the batches of the fit; none for a bound
+    slipping: float = 1.0  # the plate's slip in them, as a fraction of the flipper's own travel
 
 
 def find_shear(
@@ -83,7 +84,8 @@ def find_shear(
         return _without_pose(geometry, batches, moments, held, drag_n)
     steady = _yielding(geometry, batches, slips)
     if len(steady) >= MIN_BATCHES:
-        return _value(_case(geometry, batches, slips), steady, batches, moments)
+        shear = _value(_case(geometry, batches, slips), steady, batches, moments)
+        return shear._replace(slipping=_slipping(geometry, batches, slips, steady))
     if any(batch.saturated for batch in batches):
         return _bound(geometry, MOTOR, "a motor at its limit", batches, held)
     return _bound(geometry, BODY, "the mud held: the body moved", batches, held)
@@ -101,11 +103,18 @@ def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: 
     return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4, steady=steady)
 
 
+def _slipping(
+    geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[float], steady: Sequence[int]
+) -> float:
+    swept_m = slips_m(geometry, batches, Base.FIXED) or []
+    return exact_sum(slips[i - 1] for i in steady) / exact_sum(swept_m[i - 1] for i in steady)
+
+
 def sheared_stroke(geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, shear: Shear) -> FittedStroke:
-    """Return the part of the stance that a value or a bound of k_s is made from."""
+    """Return the part of the stance that a value or a bound of k_s is made from, at the plate's speed in the mud."""
     used = [batches[i] for i in shear.steady] or batches
     depths_m = [geometry.depth_m(batch.sweep_rad, batch.adduction_rad) - surface_m for batch in used]
-    return FittedStroke(shear.samples, max(depths_m), median([batch.speed_m_s for batch in used]))
+    return FittedStroke(shear.samples, max(depths_m), shear.slipping * median([batch.speed_m_s for batch in used]))
 
 
 def yield_force_n(

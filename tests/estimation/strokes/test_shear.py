@@ -24,6 +24,7 @@ from estimation.strokes.shear import (
     Base,
     Shear,
     find_shear,
+    sheared_stroke,
     slips_m,
     yield_force_n,
 )
@@ -170,6 +171,13 @@ def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
     shear = found(batches)
     assert shear.case == "mixed"
     assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the batch in between has half of each
+
+
+@pytest.mark.parametrize("advance", [0.0, 0.3, 0.6])
+def test_the_strength_has_the_speed_of_the_plate_in_the_mud(advance: float) -> None:
+    batches = [batch._replace(speed_m_s=0.5) for batch in sheared(poses(advance))]
+    stroke = sheared_stroke(GEOMETRY, batches, 0.0, found(batches))
+    assert stroke.speed_m_s == pytest.approx(0.5 * (1.0 - advance))
 
 
 def test_the_slip_is_the_path_back_through_the_mud() -> None:
