@@ -29,7 +29,6 @@ NODE, OTHER_NODE = 2, 3
 ZERO, IDLE, CLOSED_LOOP = bytes(4), b"\1\0\0\0", b"\x08\0\0\0"
 TORQUE_MODE = bytes.fromhex("01000000 01000000")
 CONFIGURED = bytes.fromhex("00000041 0000c040")  # 8 turns/s, 6 A
-GAINS = bytes.fromhex("0000003f 00000000")  # 0.5 N·m per turn/s, no integrator
 
 
 class Protocol(NamedTuple):

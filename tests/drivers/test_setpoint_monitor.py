@@ -13,10 +13,8 @@ TURN_RAD = 2.0 * pi
 LONGEST_REPORTS = 250  # 0.5 s
 
 
-def make_monitor(
-    command_delay_s: float = 0.0079, velocity_limit_turn_s: float = 4.0, velocity_gain_nm_s_turn: float = 0.5
-) -> SetpointMonitor:
-    return SetpointMonitor(command_delay_s, velocity_limit_turn_s, velocity_gain_nm_s_turn)
+def make_monitor(command_delay_s: float = 0.0079) -> SetpointMonitor:
+    return SetpointMonitor(command_delay_s, velocity_limit_turn_s=4.0, velocity_gain_nm_s_turn=0.5)
 
 
 def commanded(*torques_nm: float) -> SetpointMonitor:

@@ -2,7 +2,7 @@
 
 import ast
 import re
-from math import isfinite, nan
+from math import isfinite
 from pathlib import Path
 from struct import pack, unpack
 
@@ -11,15 +11,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.parameters.joint_limits import JointLimits
-from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.transmit_gate import FrameKind, GateTable, TransmitGate
-from tests.drivers.gate_bench import CLOSED_LOOP, CONFIGURED, IDLE, LIMITS, TORQUE_MODE, ZERO, GateBench, odrive
+from drivers.transmit_gate import TransmitGate
+from tests.drivers.gate_bench import (
+    CLOSED_LOOP,
+    CONFIGURED,
+    IDLE,
+    LIMITS,
+    TORQUE_MODE,
+    ZERO,
+    GateBench,
+    odrive,
+    of_moteus,
+)
 from tests.folders import ROOT
 
 MOTOR, OTHER = 0x04E, 0x06E  # torque of nodes 2 and 3
 DRIVES = [odrive(2), odrive(3)]
+each_direction = pytest.mark.parametrize("sign", [1.0, -1.0])
 HARMLESS_IDS = {frame.arbitration_id for drive in DRIVES for frame in drive.always}
 
 
@@ -92,7 +102,7 @@ def test_a_gate_is_closed_until_it_is_opened_and_lets_zero_pass_only(bench: Benc
 
 
 @pytest.mark.parametrize("limit_nm", [0.75, 0.7, 0.3, 5.0])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@each_direction
 def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_it_up(
     limit_nm: float, sign: float
 ) -> None:
@@ -103,7 +113,7 @@ def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_i
     assert bench.gate.refused == 1
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@each_direction
 def test_a_larger_step_becomes_zero_from_where_the_next_step_counts(armed: Bench, sign: float) -> None:
     assert armed.torque(sign * 0.2) == pytest.approx(sign * 0.2)
     assert armed.torque(sign * 0.40001) == 0.0
@@ -113,7 +123,7 @@ def test_a_larger_step_becomes_zero_from_where_the_next_step_counts(armed: Bench
     assert armed.torque(sign * 0.2) == pytest.approx(sign * 0.2)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@each_direction
 @pytest.mark.parametrize(("after_nm", "passes"), [(0.55, True), (0.01, True), (0.0, True), (-0.01, False)])
 def test_towards_zero_is_always_allowed_and_no_further(
     armed: Bench, sign: float, after_nm: float, passes: bool
@@ -124,7 +134,7 @@ def test_towards_zero_is_always_allowed_and_no_further(
     assert armed.gate.refused == (not passes)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@each_direction
 def test_one_step_may_lead_through_zero(armed: Bench, sign: float) -> None:
     armed.torque(sign * 0.15)
     assert armed.torque(sign * -0.05) == pytest.approx(sign * -0.05)
@@ -237,61 +247,9 @@ def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: 
     assert len(passed) <= 1
 
 
-# another protocol: 64 bytes of CAN FD with extended ids, torque at byte 4 in mN·m and a checksum in the last byte
-
-FD_MOTOR, FD_MODE = 0x18FF0205, 0x18FF0305
-FD_IDLE, FD_FOLLOW = bytes(64), b"\1" + bytes(63)
-
-
-def fd_torque(torque_mnm: int) -> bytes:
-    data = bytes(4) + torque_mnm.to_bytes(4, "little", signed=True) + bytes(55)
-    return data + bytes([sum(data) & 0xFF])
-
-
-def decode_fd_torque(data: bytes) -> float:
-    torque_mnm = int.from_bytes(data[4:8], "little", signed=True)
-    return 0.001 * torque_mnm if data == fd_torque(torque_mnm) else nan
-
-
-FD_TABLE = GateTable(
-    node_id=5,
-    torque_id=FD_MOTOR,
-    zero_torque=fd_torque(0),
-    decode_torque=decode_fd_torque,
-    always={FD_MODE: frozenset({FD_IDLE})},
-    while_open={FD_MODE: frozenset({FD_FOLLOW})},
-    kind=FrameKind(is_extended=True, is_fd=True, bit_rate_switch=True),
-)
-
-
-OTHER_KINDS = [(False, NEVER_S, True, True), (True, NEVER_S, False, True), (True, NEVER_S, True, False)]
-
-
-def fd_frame(identifier: int, data: bytes) -> Frame:
-    return Frame(identifier, data, is_extended=True, is_fd=True, bit_rate_switch=True)
-
-
-def test_a_protocol_of_64_bytes_is_gated_as_strictly() -> None:
-    bench = Bench()
-    bench.port = bench.gate.outlet(MockBus().open(), [])
-    bus = MockBus()
-    bench.far, bench.port = bus.open(), bench.gate.outlet(bus.open(), [FD_TABLE])
-    follow, idle = fd_frame(FD_MODE, FD_FOLLOW), fd_frame(FD_MODE, FD_IDLE)
-    zero, small, larger = (fd_frame(FD_MOTOR, fd_torque(torque_mnm)) for torque_mnm in (0, 200, 600))
-    assert [bench.passed(frame) for frame in (follow, idle, small)] == [[], [idle], [zero]]
-    bench.gate.open()
-    assert [bench.passed(frame) for frame in (follow, small, larger, small)] == [[follow], [small], [zero], [small]]
-    wrong_sum = fd_frame(FD_MOTOR, small.data[:-1] + b"\xff")
-    assert bench.passed(wrong_sum) == [zero]
-    assert "node 5" in bench.gate.last_refusal
-    others = [Frame(*frame[:4], *flags) for frame in (small, idle) for flags in OTHER_KINDS]
-    assert [bench.passed(frame) for frame in others] == [[]] * len(others)
-    assert bench.gate.refused == 4 + len(others)
-
-
 def test_an_outlet_takes_frames_of_one_kind() -> None:
     with pytest.raises(ValueError):
-        TransmitGate(LIMITS).outlet(MockBus().open(), [FD_TABLE, odrive().table])
+        TransmitGate(LIMITS).outlet(MockBus().open(), [of_moteus().table, odrive().table])
 
 
 def modules_of(*packages: str) -> list[Path]:

@@ -3,6 +3,7 @@
 import pytest
 
 from control.parameters.joint_limits import JointLimits
+from drivers.bench.drive_setup import FoundDrive
 from drivers.bench.search import expectation_problems, id_problems, search
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
@@ -11,38 +12,43 @@ from drivers.odrive import codec as odrive
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import TransmitGate
 from simulation.devices.drive import Forgery
+from simulation.devices.simulated_drive import SimulatedDrive
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 
 ANY_ID = 5
 
 
-def found(bus: SimulatedBus, fd: bool = True, chosen: tuple[str, ...] = ()) -> list[tuple[object, ...]]:
-    return [each[:5] for each in search(bus.bench_port(), DRIVE_BENCHES, fd, chosen).found]
+def found(*drives: SimulatedDrive, fd: bool = False) -> tuple[FoundDrive, ...]:
+    return search(SimulatedBus(*drives).bench_port(), DRIVE_BENCHES, fd).found
 
 
-def test_odrives_are_found_with_firmware_and_serial_number() -> None:
-    bus = SimulatedBus(simulated("odrive", 0, "385f324d3037"), simulated("odrive", 62, "385f324d3038"))
-    assert found(bus) == [
-        ("odrive", 0, "0.0.0", "0.6.11", "385f324d3037"),
-        ("odrive", 62, "0.0.0", "0.6.11", "385f324d3038"),
-    ]
-
-
-def test_moteus_drives_are_found_at_both_ends_of_their_ids() -> None:
-    serials = ("0123456789abcdef01234567", "89abcdef0123456789abcdef")
-    bus = SimulatedBus(simulated("moteus", 1, serials[0]), simulated("moteus", 126, serials[1]))
-    assert found(bus) == [
-        ("moteus", 1, "model 0", "1.1.0", serials[0]),
-        ("moteus", 126, "model 0", "1.1.0", serials[1]),
-    ]
-
-
-def test_a_damiao_is_found_with_the_models_of_its_ranges_and_a_cubemars_without_registers() -> None:
-    bus = SimulatedBus(simulated("mit", 1, "0badcafe", model="DM8009"), simulated("mit", 15, model="AK80-9"))
-    assert found(bus) == [
-        ("mit", 1, "DM8009", "5013", "0badcafe"),
-        ("mit", 15, "a CubeMars, or firmware without registers", "", ""),
-    ]
+@pytest.mark.parametrize(
+    ("drives", "expected"),
+    [
+        (
+            [simulated("odrive", 0, "385f324d3037"), simulated("odrive", 62, "385f324d3038")],
+            [("odrive", 0, "0.0.0", "0.6.11", "385f324d3037"), ("odrive", 62, "0.0.0", "0.6.11", "385f324d3038")],
+        ),
+        (
+            [simulated("moteus", 1, "0123456789abcdef01234567"), simulated("moteus", 126, "89abcdef0123456789abcdef")],
+            [
+                ("moteus", 1, "model 0", "1.1.0", "0123456789abcdef01234567"),
+                ("moteus", 126, "model 0", "1.1.0", "89abcdef0123456789abcdef"),
+            ],
+        ),
+        (
+            [simulated("mit", 1, "0badcafe", model="DM8009"), simulated("mit", 15, model="AK80-9")],
+            [
+                ("mit", 1, "DM8009", "5013", "0badcafe"),
+                ("mit", 15, "a CubeMars, or firmware without registers", "", ""),
+            ],
+        ),
+    ],
+)
+def test_drives_are_found_at_both_ends_of_their_ids_with_model_firmware_and_serial_number(
+    drives: list[SimulatedDrive], expected: list[tuple[object, ...]]
+) -> None:
+    assert [each[:5] for each in found(*drives, fd=True)] == expected
 
 
 def test_a_cubemars_that_reports_by_extended_ids_is_named_as_unsupported() -> None:
@@ -54,14 +60,17 @@ def test_a_cubemars_that_reports_by_extended_ids_is_named_as_unsupported() -> No
 
 
 def test_ranges_of_no_model_are_a_problem() -> None:
-    bus = SimulatedBus(simulated("mit", 1, torque_range_nm=3.3))
-    (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found
+    (drive,) = found(simulated("mit", 1, torque_range_nm=3.3))
     assert drive.hardware == "" and "TMAX" in drive.problem
 
 
 def test_firmware_0_5_is_found_by_its_heartbeat_and_the_counts_of_its_encoder() -> None:
     bus = SimulatedBus(simulated("odrive05", 7), simulated("odrive", 3, "385f324d3037"))
-    assert found(bus) == [("odrive", 3, "0.0.0", "0.6.11", "385f324d3037"), ("odrive05", 7, "", "0.5", "")]
+    result = search(bus.bench_port(), DRIVE_BENCHES, False).found
+    assert [each[:5] for each in result] == [
+        ("odrive", 3, "0.0.0", "0.6.11", "385f324d3037"),
+        ("odrive05", 7, "", "0.5", ""),
+    ]
     asked = {frame.arbitration_id for frame in bus.sent if frame.arbitration_id & 0x1F == 0x0A}
     assert asked == {7 << 5 | 0x0A}
 
@@ -71,7 +80,7 @@ def test_an_unknown_sender_of_heartbeats_is_a_problem() -> None:
     heartbeat = Frame(odrive.arbitration_id(7, odrive.HEARTBEAT), odrive.HEARTBEAT.encode(0, 1, 0, 0))
     old.receive = lambda frame, now_s: []  # type: ignore[method-assign]
     old.cyclic_frames = lambda now_s: [heartbeat]  # type: ignore[method-assign]
-    (drive,) = search(SimulatedBus(old).bench_port(), DRIVE_BENCHES, False).found
+    (drive,) = found(old)
     assert (drive.type, drive.node_id) == ("odrive05", 7) and "heartbeat" in drive.problem
 
 
@@ -88,44 +97,37 @@ def test_firmware_without_serial_numbers_is_not_asked_for_one(
 
 
 @pytest.mark.parametrize(
-    ("name", "serials"),
+    ("name", "serials", "changes"),
     [
-        ("odrive", ("385f324d3037", "385f324d3038")),
-        ("moteus", ("0123456789abcdef01234567", "89abcdef0123456789abcdef")),
-        ("mit", ("00000001", "00000002")),
+        ("odrive", ("385f324d3037", "385f324d3038"), {}),
+        ("moteus", ("0123456789abcdef01234567", "89abcdef0123456789abcdef"), {}),
+        ("mit", ("00000001", "00000002"), {}),
+        ("mit", ("", ""), {"model": "AK80-9"}),  # without registers
     ],
 )
-def test_two_drives_with_one_id_are_named_with_both_serial_numbers(name: str, serials: tuple[str, str]) -> None:
-    bus = SimulatedBus(*(simulated(name, 3, serial) for serial in serials))
-    result = search(bus.bench_port(), DRIVE_BENCHES, True)
-    (problem,) = id_problems(result.found)
+def test_two_drives_with_one_id_are_named_with_both_serial_numbers(
+    name: str, serials: tuple[str, str], changes: dict[str, str]
+) -> None:
+    (problem,) = id_problems(found(*(simulated(name, 3, serial, **changes) for serial in serials), fd=True))
     assert f"id 3 answers 2 times ({name}" in problem and all(serial in problem for serial in serials)
-
-
-def test_two_drives_without_registers_and_with_one_id_are_named() -> None:
-    bus = SimulatedBus(simulated("mit", 3, model="AK80-9"), simulated("mit", 3, model="AK80-9"))
-    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False).found)
-    assert "id 3 answers 2 times" in problem
 
 
 def test_an_id_that_answers_in_two_protocols_is_named() -> None:
     bus = SimulatedBus(simulated("odrive", 3), simulated("mit", 3))
-    result = search(bus.bench_port(), DRIVE_BENCHES, False, ("odrive", "mit"))
-    (problem,) = id_problems(result.found)
+    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False, ("odrive", "mit")).found)
     assert "id 3 answers as mit and as odrive" in problem
 
 
 def test_a_joint_whose_drive_speaks_another_protocol_is_named() -> None:
-    result = search(SimulatedBus(simulated("moteus", 3)).bench_port(), DRIVE_BENCHES, True)
     expected = {"left_sweep": OdriveParameters("can", 3), "left_adduction": OdriveParameters("can", 4)}
-    other, silent = expectation_problems(result.found, expected)
+    other, silent = expectation_problems(found(simulated("moteus", 3), fd=True), expected)
     assert "left_sweep" in other and "type moteus answers" in other
     assert "left_adduction" in silent and "nothing answers" in silent
 
 
 def test_another_serial_number_than_the_configured_one_is_named() -> None:
-    result = search(SimulatedBus(simulated("odrive", 3, "385f324d3037")).bench_port(), DRIVE_BENCHES, False)
-    (problem,) = expectation_problems(result.found, {"left_sweep": OdriveParameters("can", 3, serial_number="ab")})
+    expected = {"left_sweep": OdriveParameters("can", 3, serial_number="ab")}
+    (problem,) = expectation_problems(found(simulated("odrive", 3, "385f324d3037")), expected)
     assert "385f324d3037, not ab" in problem
 
 
@@ -162,7 +164,7 @@ def test_no_question_is_a_command_of_torque(name: str) -> None:
 def test_a_damiao_as_delivered_is_found_by_its_answers_on_id_0() -> None:
     drive = simulated("mit", 2)
     drive._feedback_id = 0  # type: ignore[attr-defined]
-    (each,) = search(SimulatedBus(drive).bench_port(), DRIVE_BENCHES, False).found
+    (each,) = found(drive)
     assert each.node_id == 2 and "MST_ID" in each.problem
 
 
@@ -170,5 +172,5 @@ def test_old_registers_of_a_moteus_are_a_problem() -> None:
     old = simulated("moteus", 4)
     answer = [old.forge(Forgery.OLD_FIRMWARE)]
     old.receive = lambda frame, now_s: answer if frame.arbitration_id & 0xFF == 4 else []  # type: ignore[method-assign]
-    (drive,) = search(SimulatedBus(old).bench_port(), DRIVE_BENCHES, True).found
+    (drive,) = found(old, fd=True)
     assert "register map 4" in drive.problem

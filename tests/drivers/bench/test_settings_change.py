@@ -15,7 +15,7 @@ from simulation.devices.simulated_drive import SimulatedDrive
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 
 ID, LONGEST_S = 3, 0.3
-NAMES = ("odrive", "moteus", "mit")
+each_type = pytest.mark.parametrize("name", ["odrive", "moteus", "mit"])
 FIRST: dict[str, Any] = {
     "watchdog_s": 0.0,
     "torque_constant_nm_a": 0.07,
@@ -68,7 +68,7 @@ class Bench:
         self.bus.sleep(3.0)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_settings_that_differ_are_written_and_outlast_a_restart(name: str) -> None:
     bench = Bench(name)
     assert len(bench.new) >= 1
@@ -80,7 +80,7 @@ def test_settings_that_differ_are_written_and_outlast_a_restart(name: str) -> No
     assert not bench.bus.energised
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_written_settings_that_were_not_stored_are_lost_in_a_restart(name: str) -> None:
     bench = Bench(name)
     for key, value in bench.new.items():
@@ -90,7 +90,7 @@ def test_written_settings_that_were_not_stored_are_lost_in_a_restart(name: str) 
     assert bench.state() == "old"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
     """Ctrl-C comes before any setting, or before the storing."""
     for calls in range(len(Bench(name).new) + 1):
@@ -101,7 +101,7 @@ def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
         assert bench.state() == "old"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_a_cable_that_comes_out_leaves_the_old_or_the_new_settings(name: str) -> None:
     whole = Bench(name)
     whole.change()
@@ -122,7 +122,7 @@ def test_a_cable_that_comes_out_leaves_the_old_or_the_new_settings(name: str) ->
     assert {Outcome.OLD_AFTER_RESTART, Outcome.UNKNOWN} <= outcomes
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_a_supply_that_fails_leaves_the_old_or_the_new_settings(name: str) -> None:
     """The drive restarts after any frame, and answers again a moment later."""
     whole = Bench(name)
@@ -136,7 +136,7 @@ def test_a_supply_that_fails_leaves_the_old_or_the_new_settings(name: str) -> No
         assert bench.state() in expected, (frames, outcome)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_nothing_is_written_while_torque_is_on(name: str) -> None:
     bench = Bench(name)
     bench.device.energised = True
@@ -145,7 +145,7 @@ def test_nothing_is_written_while_torque_is_on(name: str) -> None:
     assert bench.frames == 1 and bench.state() == "old"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_no_frame_of_a_setup_is_a_command_of_torque(name: str) -> None:
     bench = Bench(name)
     bench.change()
@@ -157,7 +157,7 @@ def test_no_frame_of_a_setup_is_a_command_of_torque(name: str) -> None:
         assert frame.data not in closing
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_type
 def test_a_silent_drive_is_named_by_what_it_was_asked(name: str) -> None:
     bench = Bench(name)
     bench.bus.unplugged_after = 0

@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from functools import cache
 from typing import Any, NamedTuple
 
 import pytest
@@ -20,6 +21,7 @@ DRIVES = {joint: DriveParameters("left" if node < 2 else "right", node) for node
 NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}
 PERIOD_S = 0.0025
 BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.7
+LEFT_JOINTS = JOINTS[:2]
 REPORTED = (
     codec.GET_ENCODER_ESTIMATES,
     codec.GET_IQ,
@@ -67,8 +69,8 @@ def reported_payload(message: codec.Message, tick: int) -> bytes:
     return message.encode(0.001 * tick, 0.002 * tick)
 
 
-def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2], seed: int = 1) -> Traffic:
-    failures = Failures(("left", "right"), seed)
+def run(component: str = "", kind: str = "") -> Traffic:
+    failures = Failures(("left", "right"))
     bus = MockBus()
     robot, inner = bus.open(), bus.open()
     port = FailingPort("left", inner, DRIVES, failures)
@@ -79,7 +81,7 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
         failures.update(now_s)
         if component and tick == round(BEGIN_S / PERIOD_S):
             assert failures.begin(component, kind, now_s, END_S - BEGIN_S) is None
-        for joint in joints:
+        for joint in LEFT_JOINTS:
             for message in REPORTED:
                 identifier = arbitration_id(NODES[joint], message)
                 robot.send(Frame(identifier, reported_payload(message, tick), stamp_s=now_s))
@@ -87,7 +89,7 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
             received[frame.arbitration_id].append((tick, frame.data))
             stamps_s.append((now_s, frame.stamp_s))
         worst = max(worst, port.state)
-        for joint in joints:
+        for joint in LEFT_JOINTS:
             frame = Frame(arbitration_id(NODES[joint], codec.SET_INPUT_TORQUE), codec.SET_INPUT_TORQUE.encode(tick))
             wanted[frame.arbitration_id].append((tick, frame.data))
             port.send(frame)
@@ -96,7 +98,7 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
     return Traffic(received, sent, wanted, worst, port.failed_sends, port.error_frames, port.last_send_error, stamps_s)
 
 
-SOUND = run()
+SOUND, seen_in = run(), cache(run)
 
 
 def opened(component: str, kind: str, inner: MockPort | None = None) -> tuple[MockPort, FailingPort, Failures]:
@@ -140,7 +142,7 @@ def test_without_a_failure_everything_passes_as_it_is() -> None:
 
 @pytest.mark.parametrize(("component", "kind"), ON_THE_LEFT)
 def test_each_failure_changes_only_its_component_and_time_and_is_reproducible(component: str, kind: str) -> None:
-    seen = run(component, kind)
+    seen = seen_in(component, kind)
     assert kind not in BY_CHANCE or seen == run(component, kind)
     check_component(seen, component, kind)
     check_time(seen)
@@ -191,19 +193,19 @@ TICKS = round((END_S - BEGIN_S) / PERIOD_S)
 
 @pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position"])
 def test_a_stuck_signal_stands_still_while_messages_keep_coming(component: str) -> None:
-    frames = position(run(component, "stuck"))
+    frames = position(seen_in(component, "stuck"))
     assert len(frames) == TICKS and len({data for _, data in frames}) == 1
 
 
 @pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
 def test_an_intermittent_signal_loses_about_half_and_one_that_is_off_does_not_arrive(component: str) -> None:
-    assert position(run(component, "off")) == []
-    assert 0.35 * TICKS < len(position(run(component, "intermittent"))) < 0.65 * TICKS
+    assert position(seen_in(component, "off")) == []
+    assert 0.35 * TICKS < len(position(seen_in(component, "intermittent"))) < 0.65 * TICKS
 
 
 @pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
 def test_a_slow_signal_is_whole_in_order_late_and_stamped_when_it_came(component: str) -> None:
-    seen = run(component, "slow")
+    seen = seen_in(component, "slow")
     frames, sound = (each.received[arbitration_id(0, codec.GET_ENCODER_ESTIMATES)] for each in (seen, SOUND))
     assert [data for _, data in frames] == [data for _, data in sound]
     delays = [late - tick for (late, _), (tick, _) in zip(frames, sound, strict=True)]
@@ -212,7 +214,7 @@ def test_a_slow_signal_is_whole_in_order_late_and_stamped_when_it_came(component
 
 
 def test_garbage_is_of_every_sort() -> None:
-    payloads = [data for _, data in position(run("left_sweep.position", "garbage"))]
+    payloads = [data for _, data in position(seen_in("left_sweep.position", "garbage"))]
     assert {len(data) for data in payloads} >= {0, 1, 4, 7, 8}
     turns = [codec.GET_ENCODER_ESTIMATES.decode(data)[0] for data in payloads if len(data) == 8]
     assert any(math.isnan(value) for value in turns) and any(math.isinf(value) for value in turns)
@@ -221,7 +223,7 @@ def test_garbage_is_of_every_sort() -> None:
 
 def error_reports(kind: str, message: codec.Message) -> set[tuple[int, int]]:
     """Return the first two values of each message: error flags, and the axis state or the reason of the disarming."""
-    frames = during(run("left_sweep.error", kind).received[arbitration_id(0, message)])
+    frames = during(seen_in("left_sweep.error", kind).received[arbitration_id(0, message)])
     return {message.decode(data)[:2] for _, data in frames}
 
 
@@ -268,7 +270,7 @@ def test_a_malformed_heartbeat_of_a_drive_with_an_error_stays_malformed() -> Non
 def test_a_failing_bus_counts_refused_frames_and_shows_its_state(
     kind: str, refused: str, state: BusState, error_frames: int
 ) -> None:
-    seen = run("bus.left", kind)
+    seen = seen_in("bus.left", kind)
     assert seen.failed_sends == (2 * TICKS if refused else 0)
     assert refused in seen.last_send_error and ("on purpose" in seen.last_send_error) == bool(refused)
     assert (seen.worst_state, seen.error_frames) == (state, error_frames)
@@ -276,7 +278,7 @@ def test_a_failing_bus_counts_refused_frames_and_shows_its_state(
 
 
 def test_a_bus_full_of_garbage_adds_random_frames_and_leaves_commands_unchanged() -> None:
-    seen = run("bus.left", "garbage")
+    seen = seen_in("bus.left", "garbage")
     assert len(seen.received) > 50 and seen.sent == SOUND.sent
 
 

@@ -23,8 +23,8 @@ class RisingPose:
         return NO_SOURCE
 
 
-def run(kind: str, seed: int = 1) -> list[tuple[float, BodyPose]]:
-    failures = Failures((), seed)
+def run(kind: str) -> list[tuple[float, BodyPose]]:
+    failures = Failures(())
     pose = FailingPose(RisingPose(), failures)
     seen = []
     for tick in range(round(STOP_S / PERIOD_S)):

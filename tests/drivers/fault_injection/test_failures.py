@@ -14,10 +14,6 @@ def failures() -> Failures:
     return Failures(BUSES)
 
 
-def test_every_kind_makes_sense_somewhere() -> None:
-    assert {kind for effects in EFFECTS.values() for kind in effects} == set(FailureKind)
-
-
 def test_every_joint_its_parts_and_every_bus_can_fail(failures: Failures) -> None:
     parts = ("", ".position", ".current", ".heartbeat", ".temperature", ".voltage", ".error", ".command")
     joints = {f"{joint}{part}" for joint in JOINTS for part in parts}

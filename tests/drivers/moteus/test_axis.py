@@ -20,13 +20,13 @@ from simulation.devices.drive import DriveError, SimulatedDriveParameters
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.moteus.forgeries import command_frame
 
-NO_TORQUE, STEP = Joints(0.0, 0.0, 0.0, 0.0), Joints(0.1, 0.0, 0.0, 0.0)
+NO_TORQUE = Joints(0.0, 0.0, 0.0, 0.0)
 
 
 class Bench:
     """Four simulated drives on one bus, of which the tests examine node 1; each tick reads, then asks or commands."""
 
-    def __init__(self, duplicate: bool = False, **changes: Any) -> None:
+    def __init__(self, **changes: Any) -> None:
         bus = MockBus()
         self.far, self.other_program = bus.open(), bus.open()
         self.parameters = {
@@ -34,8 +34,7 @@ class Bench:
         }
         self.drives = make_drives(self.parameters, {"one": bus.open()})
         ideal = SimulatedDriveParameters(1, type="moteus", torque_constant_nm_a=0.0719, current_noise_a=0.0)
-        nodes = [1, 2, 3, 4] + duplicate * [1]
-        self.devices = [SimulatedMoteus(replace(ideal, node_id=node, **changes), Random(node)) for node in nodes]
+        self.devices = [SimulatedMoteus(replace(ideal, node_id=node, **changes), Random(node)) for node in (1, 2, 3, 4)]
         self.now_s, self.silent = 0.0, False
 
     def tick(self, torques_nm: Joints[float] | None = None, settings: bool = False) -> DriveStates:

@@ -9,7 +9,7 @@ from drivers.can.mock_bus import MockBus
 from drivers.drive import WatchdogEndpoints
 from drivers.drive_types import make_drives
 from drivers.odrive.axis import OdriveAxis
-from drivers.odrive.codec import Message, arbitration_id
+from drivers.odrive.codec import HEARTBEAT, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
 
 PARAMETERS = {
@@ -44,3 +44,6 @@ class OdriveBench:
         drive = self.parameters[joint]
         frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
         self.far[drive.bus].send(frame)
+
+    def heartbeat(self, state: int = 1, error: int = 0, joint: str = "left_sweep", stamp_s: float = NEVER_S) -> None:
+        self.report(HEARTBEAT, error, state, 0, 0, joint=joint, stamp_s=stamp_s)

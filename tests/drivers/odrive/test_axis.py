@@ -17,6 +17,11 @@ from tests.drivers.odrive.odrive_bench import PARAMETERS, OdriveBench
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
 PRO = (2, 4, 4, 58, 0, 6, 11, 0)
+AT_REST: dict[Message, tuple[float, ...]] = {
+    HEARTBEAT: (0, 1, 0, 0),
+    GET_ENCODER_ESTIMATES: (0.0, 0.0),
+    GET_IQ: (0.0, 0.0),
+}
 
 
 class Bench(OdriveBench):
@@ -48,7 +53,7 @@ class Bench(OdriveBench):
             for drive in range(drives):
                 self.report(GET_ENCODER_ESTIMATES, turns[drive % len(turns)], 0.0, stamp_s=now_s)
                 if number % 50 == 25 * drive:
-                    self.report(HEARTBEAT, 0, 1, 0, 0, stamp_s=now_s)
+                    self.heartbeat(stamp_s=now_s)
             if read:
                 self.read(now_s)
         self.now_s = until_s
@@ -63,41 +68,38 @@ def test_frames_with_stamps_of_another_clock_make_no_restart_and_no_duplicate(be
     for number in range(2000):
         bench.report(GET_IQ, 0.0, 0.0, stamp_s=1e9 * (1 + number % 3))
         if number % 50 == 0:
-            bench.report(HEARTBEAT, 0, 1, 0, 0, stamp_s=-1e9 * (1 + number % 7))
+            bench.heartbeat(stamp_s=-1e9 * (1 + number % 7))
         bench.read(0.002 * number)
     assert (bench.axis.restarts, bench.axis.duplicates) == (0, False)
 
 
-@pytest.mark.parametrize("missing", [HEARTBEAT, GET_ENCODER_ESTIMATES])
-def test_one_message_that_was_missing_alone_is_no_restart(bench: Bench, missing: Message) -> None:
+@pytest.mark.parametrize("reported", [HEARTBEAT, GET_ENCODER_ESTIMATES])
+def test_one_message_that_was_missing_alone_is_no_restart(bench: Bench, reported: Message) -> None:
     bench.live(1.0)
-    reported: tuple[Message, tuple[float, ...]] = (HEARTBEAT, (0, 1, 0, 0))
-    if missing is HEARTBEAT:
-        reported = (GET_ENCODER_ESTIMATES, (0.0, 0.0))
     for number in range(500):
         if number % 25 == 0:
-            bench.report(reported[0], *reported[1])
+            bench.report(reported, *AT_REST[reported])
         bench.read(1.0 + 0.002 * number)
     bench.live(3.0)
     assert bench.axis.restarts == 0
 
 
-@pytest.mark.parametrize("heartbeat", [(0x1, 1), (0x1000001, 8), (0, 0)])
-def test_a_drive_that_initialises_or_has_no_state_was_restarted_once(bench: Bench, heartbeat: tuple[int, int]) -> None:
+@pytest.mark.parametrize(("error", "state"), [(0x1, 1), (0x1000001, 8), (0, 0)])
+def test_a_drive_that_initialises_or_has_no_state_was_restarted_once(bench: Bench, error: int, state: int) -> None:
     bench.live(0.4)
     for _ in range(3):
-        bench.report(HEARTBEAT, *heartbeat, 0, 0)
+        bench.heartbeat(state, error)
         bench.read(0.5)
     assert bench.axis.restarts == 1
-    bench.report(HEARTBEAT, 0, 1, 0, 0)
-    bench.report(HEARTBEAT, *heartbeat, 0, 0)
+    bench.heartbeat()
+    bench.heartbeat(state, error)
     bench.read(0.6)
     assert bench.axis.restarts == 2
 
 
 def test_a_drive_that_starts_with_us_was_not_restarted(bench: Bench) -> None:
     for state in (0, 0, 1):
-        bench.report(HEARTBEAT, 1 - state, state, 0, 0)
+        bench.heartbeat(state, error=1 - state)
         bench.read(bench.now_s + 0.1)
     assert bench.axis.restarts == 0
 
@@ -109,7 +111,7 @@ def test_a_silence_and_initialising_after_it_are_one_restart(bench: Bench) -> No
     bench.report(GET_ENCODER_ESTIMATES, 0.0, 0.0)
     bench.read(1.85)
     assert bench.axis.restarts == 1
-    bench.report(HEARTBEAT, 0x1, 1, 0, 0)
+    bench.heartbeat(error=0x1)
     bench.read(1.9)
     assert bench.axis.restarts == 1
 
@@ -138,11 +140,11 @@ def test_a_duplicate_is_forgotten_when_one_of_the_drives_is_removed(bench: Bench
 def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
     bench = Bench(heartbeat_period_s=period_s)
     for number in range(1, 200):
-        bench.report(HEARTBEAT, 0, 1, 0, 0)
+        bench.heartbeat()
         bench.read(number * period_s)
         assert not bench.axis.duplicates
     for number in range(1, 40):
-        bench.report(HEARTBEAT, 0, 1, 0, 0)
+        bench.heartbeat()
         bench.read(199 * period_s + number * period_s / 2.0)
     assert bench.axis.duplicates
 
@@ -164,7 +166,7 @@ def test_heartbeats_that_an_adapter_delays_by_half_a_second_are_no_duplicate(ben
         bench.report(GET_IQ, 0.0, 0.0)
         if number % 100 == 0:
             for _ in range(5):
-                bench.report(HEARTBEAT, 0, 1, 0, 0)
+                bench.heartbeat()
         bench.read(now_s)
         assert not bench.axis.duplicates
 
@@ -266,19 +268,19 @@ def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(benc
     assert bench.axis.state.current_a == 0.0
 
 
-@pytest.mark.parametrize("message", [GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT])
+@pytest.mark.parametrize("message", AT_REST)
 @pytest.mark.parametrize(("silent_s", "restarts"), [(0.29, 0), (0.32, 1), (60.0, 1)])
 def test_any_message_after_a_silence_of_all_is_a_restart(
     bench: Bench, message: Message, silent_s: float, restarts: int
 ) -> None:
-    for each in (GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT):
-        bench.report(each, *((0, 1, 0, 0) if each is HEARTBEAT else (0.0, 0.0)), stamp_s=1.0)
+    for each, values in AT_REST.items():
+        bench.report(each, *values, stamp_s=1.0)
     bench.report(GET_VERSION, *PRO)
     bench.read(1.0)
     assert bench.axis.health.restarts == 0
     for tick in range(1, round(silent_s / 0.01) + 1):
         bench.read(1.0 + 0.01 * tick)
-    bench.report(message, *((0, 1, 0, 0) if message is HEARTBEAT else (0.0, 0.0)), stamp_s=bench.now_s + 0.01)
+    bench.report(message, *AT_REST[message], stamp_s=bench.now_s + 0.01)
     bench.read(bench.now_s + 0.01)
     assert bench.axis.health.restarts == restarts
     assert (bench.axis.settings.version is None) == bool(restarts)
@@ -286,7 +288,7 @@ def test_any_message_after_a_silence_of_all_is_a_restart(
 
 def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) -> None:
     for state, busy in ((1, ""), (3, "axis state 3"), (8, ""), (3, "axis state 3"), (1, "")):
-        bench.report(HEARTBEAT, 0, state, 0, 0)
+        bench.heartbeat(state)
         bench.read(bench.now_s + 0.1)
         assert bench.axis.health.busy_state == busy
 
@@ -297,13 +299,13 @@ def test_set_points_that_were_not_commanded_are_another_program_s_in_closed_loop
 ) -> None:
     constant_nm_a = bench.axis.parameters.torque_constant_nm_a
     for setpoint_nm, problem in ((0.1, False), (-0.3, found)):
-        bench.report(HEARTBEAT, 0, state, 0, 0)
+        bench.heartbeat(state)
         for _ in range(40):
             bench.axis.send_torque(0.1)
             bench.report(GET_ENCODER_ESTIMATES, 0.0, turns_s)
             bench.report(GET_IQ, setpoint_nm / constant_nm_a, 0.0)
             bench.read(bench.now_s + 0.01)
         assert bool(bench.axis.health.setpoint_problem) is problem
-    bench.report(HEARTBEAT, 0, 1, 0, 0)  # it left closed loop
+    bench.heartbeat()  # it left closed loop
     bench.read(bench.now_s + 0.01)
     assert bench.axis.health.setpoint_problem == ""

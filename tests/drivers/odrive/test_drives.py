@@ -1,11 +1,9 @@
 """Four drives as joints, over buses in this process: which frames are understood, ignored and transmitted."""
 
-from math import inf, isfinite, nan, pi
+from math import inf, nan, pi
 from struct import pack
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
@@ -38,7 +36,6 @@ SLOW_SIGNALS: list[tuple[Message, tuple[float, ...]]] = [
     (GET_ERROR, (0, 0)),
     (GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0)),
 ]
-RECEIVED = [message for message, _ in SIGNALS + SLOW_SIGNALS]
 BOUNDLESS = JointLimits(torque_nm=1e9, torque_rate_nm_s=1e12)
 
 
@@ -49,11 +46,15 @@ class Bench(OdriveBench):
         for joint in JOINTS:
             for message, values in SIGNALS + SLOW_SIGNALS:
                 self.report(message, *values, joint=joint)
-            self.report(HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0, joint=joint)
+            self.heartbeat(8 if closed_loop else 1, joint=joint)
         return self.drives.read(now_s)
 
     def sent(self) -> dict[str, list[Frame]]:
         return {name: port.receive() for name, port in self.far.items()}
+
+    def sent_for_closed_loop(self) -> int:
+        """Return how many drives are asked for it."""
+        return sum(frame.arbitration_id & 0x1F == 0x07 for frames in self.sent().values() for frame in frames)
 
     def silent(self) -> bool:
         return not any(self.sent().values())
@@ -65,12 +66,12 @@ def bench() -> Bench:
 
 
 def test_the_newest_measured_current_counts_and_the_zero_is_subtracted_before_the_sign(bench: Bench) -> None:
-    bench.report(GET_ENCODER_ESTIMATES, 0.5, 0.0, joint="left_adduction")
+    bench.report(GET_ENCODER_ESTIMATES, 0.5, 2.0, joint="left_adduction")
     for current_a in (1.0, 2.0, 1.5):
         bench.report(GET_IQ, 9.0, current_a)
     states = bench.drives.read(1.0)
     assert states[0].current_a == 1.5
-    assert states[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
+    assert (states[1].angle_rad, states[1].velocity_rad_s) == pytest.approx((-0.25 * 2.0 * pi, -2.0 * 2.0 * pi))
     assert bench.silent()  # reading transmits nothing
 
 
@@ -96,7 +97,7 @@ def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
 
 def test_every_field_comes_from_its_message(bench: Bench) -> None:
     bench.report_everything(1.0)
-    bench.report(HEARTBEAT, 0x1000000, 1, 0, 0)
+    bench.heartbeat(error=0x1000000)
     state = bench.drives.read(2.0)[0]
     assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
     assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
@@ -143,37 +144,6 @@ def test_malformed_and_unknown_frames_are_counted_and_change_nothing(
     assert (bench.drives.malformed_frames, bench.drives.unknown_frames) == (malformed, unknown)
 
 
-KNOWN_IDS = [arbitration_id(node, message) for node in range(4) for message in RECEIVED]
-ANY_ID = st.integers(0, 0x7FF) | st.sampled_from(KNOWN_IDS)
-ANY_FLOATS = st.tuples(st.floats(width=32), st.floats(width=32)).map(lambda pair: pack("<ff", *pair))
-ANY_FRAME = st.builds(Frame, ANY_ID, st.binary(max_size=8) | ANY_FLOATS, st.booleans(), st.just(False), st.booleans())
-
-
-def test_hundreds_of_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
-    bench = Bench()
-    bench.report_everything(0.0)
-
-    def examine(frame: Frame) -> None:
-        before, states = bench.drives.malformed_frames + bench.drives.unknown_frames, bench.drives.read(1.0)
-        bench.far["left"].send(frame)
-        after = bench.drives.read(1.0)
-        ignored = bench.drives.malformed_frames + bench.drives.unknown_frames - before
-        assert ignored in (0, 1)
-        assert not ignored or repr(after) == repr(states)
-        assert all(isfinite(state.angle_rad + state.velocity_rad_s + state.current_a) for state in after)
-        assert repr(after[2:]) == repr(states[2:])  # the other bus
-
-    @settings(max_examples=10)
-    @given(st.lists(ANY_FRAME, min_size=40, max_size=40))
-    def examine_all(frames: list[Frame]) -> None:
-        for frame in frames:
-            examine(frame)
-
-    examine_all()
-    assert bench.drives.malformed_frames > 0
-    assert bench.silent()
-
-
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize("missing", [message for message, _ in SIGNALS])
 def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, joint: str, missing: Message) -> None:
@@ -214,9 +184,9 @@ def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order
 def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0, at_once=True)
-    assert all(frame.arbitration_id & 0x1F != 0x07 for frames in bench.sent().values() for frame in frames)
+    assert bench.sent_for_closed_loop() == 0
     bench.drives.arm(1.0)
-    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+    assert bench.sent_for_closed_loop() == 4
 
 
 def test_no_drive_is_asked_for_closed_loop_while_its_preparation_is_lost(bench: Bench) -> None:
@@ -226,9 +196,9 @@ def test_no_drive_is_asked_for_closed_loop_while_its_preparation_is_lost(bench: 
     port.full = True
     bench.drives.arm(1.0)
     port.full = False
-    assert not any(frame.arbitration_id & 0x1F == 0x07 for frame in bench.sent()["right"])
+    assert bench.sent_for_closed_loop() == 0
     bench.drives.arm(1.01 + REPEAT_S)
-    assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
+    assert bench.sent_for_closed_loop() == 4
 
 
 def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop(bench: Bench) -> None:
@@ -236,7 +206,7 @@ def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop
     bench.drives.arm(1.0)
     assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
     for joint in JOINTS[:3]:
-        bench.report(HEARTBEAT, 0, 8, 0, 0, joint=joint)
+        bench.heartbeat(8, joint=joint)
     bench.drives.read(1.05)
     bench.drives.arm(1.0 + 0.99 * REPEAT_S)
     assert bench.silent()
@@ -259,7 +229,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
 
 def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
-    bench.report(HEARTBEAT, 0, 8, 0, 0, joint="left_adduction")
+    bench.heartbeat(8, joint="left_adduction")
     bench.drives.read(1.0)
     for _ in range(3):
         bench.drives.disarm(1.0)

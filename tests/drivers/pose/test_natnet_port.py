@@ -191,15 +191,12 @@ def test_a_pose_after_a_gap_or_a_jump_is_accepted_when_a_second_one_follows(open
     assert reported[0][0] >= 1.5 + FRAME_S
 
 
-def test_malformed_and_foreign_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
+def test_malformed_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(0.5))
     assert known(lab.run(0.4))
     frame = encode_frame(lab.server.version, 1, [], FrameTimes(0.0, 0, 0, 0))
     assert isfinite(lab.send(b"", b"\x07", frame[:-30], b"\x07\x00\xff\xff" + bytes(20)).x_m)
     assert lab.client.malformed == 4
-    lab.client.parameters = replace(lab.client.parameters, server="127.0.0.9")
-    lab.send(frame)
-    assert lab.client.malformed == 5
 
 
 def test_a_server_that_comes_back_with_another_version_is_understood(open_laboratory: Open) -> None:
@@ -239,5 +236,6 @@ def test_frames_of_another_computer_than_the_server_are_reported(open_laboratory
     laboratory.client.parameters = replace(laboratory.client.parameters, server="127.0.0.9")
     laboratory.run(0.3 + 2.0 * STALE_S)
     report = laboratory.port.report()
+    assert report.malformed > 0
     assert report.trouble == f"packets arrive from {LOOPBACK}, and none from 127.0.0.9."
     assert "pose.natnet.server" in report.what_to_do
