@@ -19,8 +19,8 @@ INERTIA_KG_M2 = 0.0004
 class TwoBodies:
     """A rotor and an arm without friction, joined by a belt."""
 
-    def __init__(self, play_rad: float = PLAY_RAD) -> None:
-        self.belt = Belt(play_rad, INERTIA_KG_M2, friction_nm=0.0)
+    def __init__(self) -> None:
+        self.belt = Belt(PLAY_RAD, INERTIA_KG_M2, friction_nm=0.0)
         self.arm_kg_m2 = INERTIA_KG_M2 - self.belt.rotor_kg_m2
         self.angle_rad = self.velocity_rad_s = 0.0
 

@@ -23,6 +23,7 @@ from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ContactForce, contact_force
 from simulation.mud.rigid_plate import Wrench
 from simulation.mud.track import Track
+from tests.control.test_geometry import rotation
 
 GEOMETRY, SHAPE, MASS_KG = FlipperGeometry(), BodyShape(), 1.02
 AHEAD_M = 0.02  # the joints are ahead of the centre of mass, where geometry is tested
@@ -65,10 +66,8 @@ def turned(roll_rad: float, pitch_rad: float) -> np.ndarray:
 
 def plate_in_body(sweep_rad: float, adduction_rad: float, side: float) -> np.ndarray:
     """Return as columns the plate's axes n, r and s and the intersection of the joints' axes; y is to the left."""
-    ca, sa = np.cos(sweep_rad), np.sin(sweep_rad)
-    tilted = turned(adduction_rad, 0.0) @ np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
     joints = np.array([[AHEAD_M], [SHAPE.width_m / 2.0], [0.0]])
-    return np.asarray(np.diag([1.0, side, 1.0]) @ np.hstack([tilted, joints]))
+    return np.asarray(np.diag([1.0, side, 1.0]) @ np.hstack([rotation(sweep_rad, adduction_rad), joints]))
 
 
 def point_in_world(state: np.ndarray, side: float, u: float, s: float) -> np.ndarray:

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.parameters.arm_mass import ArmMass
 from control.records import Joints
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
@@ -25,13 +24,12 @@ from simulation.mud.disturbances import (
 from simulation.mud.track import Track
 
 GEOMETRY = FlipperGeometry()
-DRY = PlantParameters(joint_coulomb_nm=0.02, arm_mass=ArmMass(arm_mass_kg=0.0))
 ABOVE_M = -0.014  # where the plate swings
 SOFT = Track([(5.0, MUDS["53.1"])])
 
 
-def history_of(seed: int = 1, **disturbances: float) -> StrokeHistory:
-    return StrokeHistory(Disturbances(**disturbances), seed)
+def history_of(**disturbances: float) -> StrokeHistory:
+    return StrokeHistory(Disturbances(**disturbances), 1)
 
 
 def lowered(history: StrokeHistory, position_m: float = 0.0, depth_m: float = 0.02) -> StrokeHistory:
@@ -192,6 +190,3 @@ def test_friction_adds_to_that_of_the_plant_and_holds_one_resting_joint(joint: s
     held, moved, same = speeds_rad_s
     assert held == [0.0, 0.0] and direction * moved[0] > 0.0
     assert moved == pytest.approx(same)
-
-
-# whole walks

@@ -1,7 +1,5 @@
 """The virtual load cell agrees with closed forms for upright plates and with the flipper's contact for leaning ones."""
 
-from math import cos, sin
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,6 +11,7 @@ from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, FlipperContact
 from simulation.mud.layer import Layer
 from simulation.test_rig.joint_cell import measure_stroke
 from simulation.test_rig.load_cell import STEP_S, LoadCell, measure_shear
+from tests.control.test_geometry import rotation
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]
@@ -20,8 +19,8 @@ EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m
 GIRTH_M = 2.0 * (GEOMETRY.plate_width_m + GEOMETRY.plate_thickness_m)
 
 
-def lowered_rad(sweep_rad: float, depth_m: float = 0.03) -> float:
-    return GEOMETRY.adduction_rad(sweep_rad, depth_m)
+def lowered_rad(sweep_rad: float) -> float:
+    return GEOMETRY.adduction_rad(sweep_rad, 0.03)
 
 
 def strokes(
@@ -35,9 +34,7 @@ def strokes(
 @given(st.floats(-0.6, 0.6), st.floats(-1.0, 0.0))
 def test_the_axes_are_those_of_the_flipper_s_plate(sweep_rad: float, adduction_rad: float) -> None:
     axes = np.array(LoadCell(CLAY, GEOMETRY, sweep_rad, adduction_rad).axes)
-    sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-    tilt = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])
-    assert pytest.approx(tilt @ np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])) == axes.T
+    assert pytest.approx(rotation(sweep_rad, adduction_rad)) == axes.T
     attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad)
     assert axes[1:, 2] == pytest.approx((-attitude.per_outward, attitude.per_upward))
 

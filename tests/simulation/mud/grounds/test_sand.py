@@ -13,9 +13,11 @@ from simulation.mud.grounds.sand import Sand, generic_resistance, spatial_resist
 from simulation.mud.grounds.sand_contact import SandContact
 from simulation.mud.rigid_plate import Attitude, PlateSize, Twist
 from tests.folders import SHARED_DATA
+from tests.simulation.mud.plate_paths import SIZE, assert_no_work_is_gained, twists
 
 UP, DOWN, AHEAD = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 SANDS = [Sand("generic", 1.55e6), Sand("spatial", 1.55e6, spatial=True)]
+each_sand = pytest.mark.parametrize("sand", SANDS, ids=lambda sand: sand.name)
 RUNS = sorted((SHARED_DATA / "plate_in_sand").glob("*.csv.gz"))
 DEEPEST_M = 0.03  # that of a flipper
 
@@ -49,10 +51,6 @@ def test_maps_do_not_depend_on_the_heading_and_mirror(heading: float, bearing: f
             assert there == pytest.approx(tuple(change @ here), abs=1e-6)
 
 
-turns, speeds = st.floats(-4.0, 4.0), st.floats(-0.5, 0.5)
-twists = st.builds(Twist, speeds, speeds, speeds, turns, turns, turns, turns)
-
-
 def attitude_of(depth_m: float, sweep_rad: float, lean_rad: float) -> Attitude:
     tilt = sin(lean_rad)
     return Attitude(depth_m, -cos(sweep_rad) * tilt, cos(lean_rad), sin(sweep_rad) * tilt)
@@ -61,26 +59,21 @@ def attitude_of(depth_m: float, sweep_rad: float, lean_rad: float) -> Attitude:
 attitudes = st.builds(attitude_of, st.floats(-0.004, 0.08), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
 
 
-@pytest.mark.parametrize("sand", SANDS, ids=lambda sand: sand.name)
+@each_sand
 @settings(max_examples=15)
 @given(st.lists(st.tuples(attitudes, twists, st.integers(1, 20)), min_size=1, max_size=8))
 def test_no_path_returns_more_work_than_the_sand_received(
     sand: Sand, motions: list[tuple[Attitude, Twist, int]]
 ) -> None:
     """Closed paths are among them: the plate may come back to any depth, and each leg here is also gone back."""
-    plate, given_j = SandContact(PlateSize(0.025, 0.07, 0.004)), 0.0
     backwards = [(a, Twist(*(-part for part in t)), n) for a, t, n in reversed(motions)]
-    for attitude, twist, steps in [*motions, *backwards]:
-        for _ in range(steps):
-            wrench = plate.step(0.001, sand, attitude, twist)
-            given_j += 0.001 * sum(force * speed for force, speed in zip(wrench, twist, strict=True))
-            assert given_j < 1e-9
+    assert_no_work_is_gained(SandContact(SIZE), [(sand, *motion) for motion in (*motions, *backwards)])
 
 
-@pytest.mark.parametrize("sand", SANDS, ids=lambda sand: sand.name)
+@each_sand
 def test_a_plate_at_rest_keeps_its_load_until_a_reset(sand: Sand) -> None:
     """In three dimensions the narrow sides add a part to the face's."""
-    plate, deep = SandContact(PlateSize(0.025, 0.07, 0.004)), Attitude(0.03, 0.0, 1.0)
+    plate, deep = SandContact(SIZE), Attitude(0.03, 0.0, 1.0)
     for _ in range(300):
         moving = plate.step(0.001, sand, deep, Twist(0.1))
     assert -moving.normal_n == pytest.approx(sand.lateral_n(0.03, 0.025), rel=0.08 if sand.spatial else 1e-3)
