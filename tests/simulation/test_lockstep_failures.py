@@ -14,7 +14,6 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.copied_robots import copy_of
-from tests.recorded_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])
 
@@ -32,14 +31,6 @@ def sound(configuration: Configuration) -> Lockstep:
 @pytest.fixture
 def lockstep(sound: Lockstep) -> Lockstep:
     return copy_of(sound)
-
-
-def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
-    recorder = EventRecorder()
-    lockstep = Lockstep(configuration, TRACK, recorder=recorder, failures=Failures(configuration.bus))
-    lockstep.fail("pose", "off", 0.1)
-    lockstep.run_for(0.2)
-    assert len(recorder.about("on purpose: pose off")) == 2
 
 
 def test_a_stalled_loop_misses_ticks_while_the_robot_continues(lockstep: Lockstep) -> None:

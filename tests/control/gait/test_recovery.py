@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
 from itertools import groupby, pairwise
 from math import copysign, cos, degrees, nan, radians, sin
@@ -253,9 +252,9 @@ def test_stopping_ends_a_recovery_and_forgets_it() -> None:
 # what it does
 
 
-def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list[list[JointTargets]]:
+def attempts_at(sweep_deg: float) -> list[list[JointTargets]]:
     """Return the targets of each attempt at a left flipper that nothing moves."""
-    recovery = Recovery(replace(PARAMETERS, lead_deg=lead_deg), GEOMETRY, GAIT, RANGES)
+    recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
     free, given = DriveState(angle_rad=0.0), list[list[JointTargets]]()
     states = Joints(DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
     while not recovery.given_up:

@@ -1,12 +1,10 @@
 """What every simulated drive does alike, commanded and read by the axes of its type over a bus."""
 
 from dataclasses import replace
-from math import exp, isfinite
-from random import Random
+from math import exp
 
 import pytest
 
-from drivers.can.frames import Frame
 from simulation.devices.drive import DriveError
 from tests.simulation.devices.driven_drives import CONSTANT_NM_A, TICK_S, TYPES, DrivenDrives
 
@@ -136,16 +134,3 @@ def test_late_and_repeated_values_are_of_the_past_and_the_newest_one_is_last(nam
     assert angles_rad == sorted(angles_rad)
     assert -0.005 < min(ages_s) < 0.02 < max(ages_s) < 0.1  # the age of repeated values is not bounded
     assert not drives.drives.malformed_frames
-
-
-@each_type
-def test_malformed_frames_are_ignored(name: str) -> None:
-    drives, random = DrivenDrives(name), Random(2)
-    drives.arm()
-    known = list(drives.axis.receivers)  # its reports and its commands
-    for _ in range(400):
-        identifier = random.choice([*known, random.randrange(0x800)])
-        frame = Frame(identifier & 0x1FFFFFFF, random.randbytes(random.randint(0, 8)), is_remote=random.random() < 0.1)
-        for device in drives.devices:
-            device.receive(frame, drives.now_s)
-            assert isfinite(device.torque_nm(drives.now_s))

@@ -106,12 +106,6 @@ def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
     assert health.firmware_supported and drives.drives.unknown_frames == 0
 
 
-# other programs
-
-
-# ids
-
-
 def test_old_cubemars_that_all_answer_under_id_0_are_distinguished_by_their_first_byte() -> None:
     drives = DrivenDrives(CUBEMARS)
     for index in range(4):

@@ -12,7 +12,7 @@ from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.odrive05.device import SimulatedOdrive05, join_boards
 from tests.drivers.bench.simulated_bus import simulated
-from tests.simulation.devices.test_odrive import NODE, ask, report
+from tests.simulation.devices.test_odrive import NODE, arm, ask, report
 
 ANSWERED = [
     codec05.HEARTBEAT, codec05.GET_MOTOR_ERROR, codec05.GET_ENCODER_ERROR, codec05.GET_CONTROLLER_ERROR,
@@ -25,9 +25,7 @@ def make_drive(armed: bool = False, **changes: Any) -> SimulatedOdrive05:
     assert isinstance(drive, SimulatedOdrive05)
     drive.reset(0.0)
     if armed:
-        report(drive, codec.SET_CONTROLLER_MODE, 1, 1)
-        report(drive, codec.SET_LIMITS, 100.0, 100.0)
-        report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+        arm(drive)
     return drive
 
 

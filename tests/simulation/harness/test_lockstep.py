@@ -4,7 +4,6 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
@@ -59,15 +58,3 @@ def test_a_robot_walks_at_any_rate_and_at_its_own_with_everything_that_can_be_wr
         faults.update(fault.name for fault in lockstep.loop.faults.present)
     assert (lockstep.loop.mode, lockstep.loop.drives.refused_commands, faults) == (Mode.HOLD, 0, set())
     assert lockstep.robot.plant.body_m > 0.05
-
-
-def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:
-    lockstep = Lockstep(configuration, TRACK)
-    obeyed: list[Frame] = []
-    for drive in lockstep.robot.drives:
-        drive.receive = lambda frame, now_s: obeyed.append(frame) or []  # type: ignore[func-returns-value, method-assign]
-    lockstep.run_until(lambda: lockstep.loop.mode is not Mode.BOOT, 1.0)
-    assert lockstep.loop.mode is Mode.IDLE
-    assert obeyed == []
-    lockstep.run_for(1.0)
-    assert lockstep.loop.mode is Mode.IDLE and not any(drive.energised for drive in lockstep.robot.drives)

@@ -37,24 +37,24 @@ def operate(bench: VendorBench) -> None:
             for _ in range(10):
                 motor.send_cmd_mit(feedforward_torque=TORQUE_NM)
                 time.sleep(0.01)
-            assert bench.torques_nm[0] == pytest.approx(TORQUE_NM, abs=STEP_NM)
+            assert bench.torque_nm == pytest.approx(TORQUE_NM, abs=STEP_NM)
             assert motor.get_states()["torq"] == pytest.approx(TORQUE_NM, abs=2.0 * STEP_NM)
-            assert motor.get_states()["pos"] == pytest.approx(bench.angles_rad[0], abs=0.1)
+            assert motor.get_states()["pos"] == pytest.approx(bench.angle_rad, abs=0.1)
             wait_until(lambda: has_status(codec.LOST_COMMANDS), "its time-out, which questions do not feed")
-            assert bench.torques_nm[0] == 0.0
+            assert bench.torque_nm == 0.0
             motor.clear_error()
             wait_until(lambda: has_status(codec.DISABLED), "cleared")
-        bench.velocities_rad_s[0] = 0.0
+        bench.velocity_rad_s = 0.0
         motor.set_zero_position()
         wait_until(lambda: has_status(codec.DISABLED) and abs(motor.get_states()["pos"]) < 0.01, "its new zero")
-        assert abs(bench.angles_rad[0]) > 0.01
+        assert abs(bench.angle_rad) > 0.01
     finally:
         controller.shutdown()
 
 
 def test_damiao_motor_operates_a_drive_and_our_driver_reads_what_it_has_set() -> None:
     parameters = MitParameters(bus="a", node_id=1, serial_number="0badcafe")
-    with vendor_bench("mit", serial_number="0badcafe") as bench, bench.driver(parameters) as ours:
+    with vendor_bench("mit", serial="0badcafe") as bench, bench.driver(parameters) as ours:
         operate(bench)
         axis = ours.read_until(lambda axis: axis.health.watchdog_s > 0.0 and axis.health.serial_number != "")
     assert axis.health.watchdog_s == pytest.approx(1e-3 * TIMEOUT_MS) and axis.health.serial_number == "0badcafe"

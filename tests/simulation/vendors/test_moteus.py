@@ -34,22 +34,22 @@ async def operate(bench: VendorBench) -> None:
             for _ in range(10):
                 result = await drive.set_position(feedforward_torque=TORQUE_NM, **PURE_TORQUE)
                 await asyncio.sleep(0.01)
-            assert bench.torques_nm[0] == pytest.approx(TORQUE_NM)
+            assert bench.torque_nm == pytest.approx(TORQUE_NM)
             assert result.values[registers.MODE] == moteus.Mode.POSITION
             assert result.values[registers.TORQUE] == pytest.approx(TORQUE_NM)
             assert result.values[registers.Q_CURRENT] == pytest.approx(TORQUE_NM / CONSTANT_NM_A)
             await asyncio.sleep(1.3 * TIMEOUT_S)
             result = await drive.set_position(feedforward_torque=TORQUE_NM, **PURE_TORQUE)
-            assert result.values[registers.MODE] == moteus.Mode.TIMEOUT and bench.torques_nm[0] == 0.0
+            assert result.values[registers.MODE] == moteus.Mode.TIMEOUT and bench.torque_nm == 0.0
             await drive.set_stop()
             assert (await drive.query()).values[registers.MODE] == moteus.Mode.STOPPED
         await drive.set_current(q_A=1.0, d_A=0.0)
         await asyncio.sleep(0.05)
-        assert bench.torques_nm[0] == pytest.approx(CONSTANT_NM_A)
+        assert bench.torque_nm == pytest.approx(CONSTANT_NM_A)
         for brake in (drive.set_brake, drive.set_zero_velocity):
             await brake()
             await asyncio.sleep(0.05)
-            assert bench.torques_nm[0] * bench.velocities_rad_s[0] < 0.0
+            assert bench.torque_nm * bench.velocity_rad_s < 0.0
         await drive.set_stop()
         unknown = await drive.custom_query({0x3FF: moteus.F32})
         assert 0x3FF not in unknown.values
@@ -58,7 +58,7 @@ async def operate(bench: VendorBench) -> None:
 
 
 def test_the_makers_controller_operates_a_drive_and_our_driver_reads_what_it_has_set() -> None:
-    changes: dict[str, Any] = {"torque_constant_nm_a": CONSTANT_NM_A, "serial_number": SERIAL}
+    changes: dict[str, Any] = {"torque_constant_nm_a": CONSTANT_NM_A, "serial": SERIAL}
     with vendor_bench("moteus", fd=True, **changes) as bench:
         parameters = MoteusParameters(bus="a", node_id=1, torque_constant_nm_a=CONSTANT_NM_A, serial_number=SERIAL)
         with bench.driver(parameters) as ours:

@@ -40,10 +40,10 @@ async def operate(drive: Any, bench: VendorBench) -> None:
         for _ in range(10):
             drive.set_input_torque(TORQUE_NM)
             await asyncio.sleep(0.01)
-        assert bench.torques_nm[0] == pytest.approx(TORQUE_NM)
-        assert speeds_turn_s[-1] == pytest.approx(bench.velocities_rad_s[0] / TURN_RAD, rel=0.5)
+        assert bench.torque_nm == pytest.approx(TORQUE_NM)
+        assert speeds_turn_s[-1] == pytest.approx(bench.velocity_rad_s / TURN_RAD, rel=0.5)
         await asyncio.sleep(0.35)  # without a command, and until the next heartbeat
-        assert bench.torques_nm[0] == 0.0
+        assert bench.torque_nm == 0.0
         with pytest.raises(DriveError, match="WATCHDOG"):
             drive.check_errors()
         drive.clear_errors()
@@ -51,11 +51,11 @@ async def operate(drive: Any, bench: VendorBench) -> None:
         drive.check_errors()
     await drive.set_axis_state("CLOSED_LOOP_CONTROL")
     drive.stop()
-    wait_until(lambda: not bench.drives[0].energised, "idle")
+    wait_until(lambda: not bench.drive.energised, "idle")
 
 
 def test_odrive_can_operates_a_drive_through_a_whole_session_and_our_driver_sees_it() -> None:
-    with vendor_bench("odrive", watchdog_s=0.15, serial_number=SERIAL) as bench:
+    with vendor_bench("odrive", watchdog_s=0.15, serial=SERIAL) as bench:
         parameters = OdriveParameters(bus="a", node_id=1, serial_number=SERIAL)
         with bench.driver(parameters) as ours:
             asyncio.run(operate(ODriveCAN(1, bench.open_bus()), bench))  # it closes its bus
@@ -107,7 +107,7 @@ DBC_CASES = {  # firmware: type of the drive, message with the error, its signal
 @pytest.mark.parametrize("firmware", DBC_CASES)
 def test_the_makers_dbc_operates_a_drive_through_a_whole_session(firmware: str) -> None:
     type_name, message, signal, expected = DBC_CASES[firmware]
-    with vendor_bench(type_name, watchdog_s=0.15, serial_number=SERIAL) as bench:
+    with vendor_bench(type_name, watchdog_s=0.15, serial=SERIAL) as bench:
         program = DbcProgram(firmware, bench)
         try:
             program.read_until(lambda: "Heartbeat" in program.newest, "a heartbeat")
@@ -119,10 +119,10 @@ def test_the_makers_dbc_operates_a_drive_through_a_whole_session(firmware: str) 
                 for _ in range(10):
                     program.send("Set_Input_Torque", Input_Torque=-TORQUE_NM)
                     time.sleep(0.01)
-                assert bench.torques_nm[0] == pytest.approx(-TORQUE_NM)
+                assert bench.torque_nm == pytest.approx(-TORQUE_NM)
                 assert program.ask("Get_Iq")["Iq_Measured"] == pytest.approx(-TORQUE_NM / CONSTANT_NM_A, rel=1e-4)
                 program.read_until(lambda: str(expected) in str(program.newest.get(message, {}).get(signal)), expected)
-                assert bench.torques_nm[0] == 0.0
+                assert bench.torque_nm == 0.0
                 program.newest.clear()
             program.send("Set_Axis_State", Axis_Requested_State="IDLE")
         finally:
@@ -130,7 +130,7 @@ def test_the_makers_dbc_operates_a_drive_through_a_whole_session(firmware: str) 
 
 
 def test_a_drive_answers_the_makers_questions_to_all_drives() -> None:
-    with vendor_bench("odrive", serial_number=SERIAL) as bench:
+    with vendor_bench("odrive", serial=SERIAL) as bench:
         program = DbcProgram("0.6.10", bench)
         try:
             assert program.ask("Get_Version", codec.BROADCAST_NODE)["Fw_Version_Minor"] == 6

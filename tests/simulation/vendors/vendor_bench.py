@@ -1,6 +1,6 @@
-"""Simulated drives on a bus of python-can in real time, for the makers' own programs, and our driver on the same bus.
+"""A simulated drive on a bus of python-can in real time, for the makers' own programs, and our driver on the same bus.
 
-A thread is the hardware: it answers frames and turns a flywheel on each motor.
+A thread is the hardware: it answers frames and turns a flywheel on the motor.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from random import Random
 from typing import Any
 
 import can
@@ -21,9 +20,8 @@ from drivers.drive import DriveParameters
 from drivers.drive_axis import DriveAxis
 from drivers.drive_types import DRIVE_TYPES
 from drivers.transmit_gate import TransmitGate
-from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.drive_types import make_simulated_drive
 from simulation.devices.simulated_drive import SimulatedDrive
+from tests.drivers.bench.simulated_bus import simulated
 
 STEP_S = 0.001
 FLYWHEEL_KG_M2 = 0.2
@@ -31,12 +29,11 @@ PATIENCE_S = 5.0
 
 
 class VendorBench:
-    """Owns the drives and the thread that steps them; `open_bus` gives a program its end of the bus."""
+    """Owns a drive and the thread that steps it; `open_bus` gives a program its end of the bus."""
 
-    def __init__(self, channel: str, drives: list[SimulatedDrive], fd: bool) -> None:
-        self.channel, self.drives, self._fd = channel, drives, fd
-        self.angles_rad, self.velocities_rad_s = [0.0] * len(drives), [0.0] * len(drives)
-        self.torques_nm = [0.0] * len(drives)
+    def __init__(self, channel: str, drive: SimulatedDrive, fd: bool) -> None:
+        self.channel, self.drive, self._fd = channel, drive, fd
+        self.angle_rad = self.velocity_rad_s = self.torque_nm = 0.0
         self._bus = self.open_bus()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -50,19 +47,17 @@ class VendorBench:
         while not self._ended.is_set():
             message = self._bus.recv(STEP_S)
             now_s = time.monotonic()
-            for index, drive in enumerate(self.drives):
-                answers = drive.receive(frame_from(message), now_s) if message else []
-                self.torques_nm[index] = torque_nm = drive.torque_nm(now_s)
-                self.velocities_rad_s[index] += torque_nm / FLYWHEEL_KG_M2 * (now_s - before_s)
-                self.angles_rad[index] += self.velocities_rad_s[index] * (now_s - before_s)
-                drive.measure(self.angles_rad[index], self.velocities_rad_s[index])
-                for frame in (*answers, *drive.cyclic_frames(now_s)):
-                    self._bus.send(message_from(frame))
+            answers = self.drive.receive(frame_from(message), now_s) if message else []
+            self.torque_nm = self.drive.torque_nm(now_s)
+            self.velocity_rad_s += self.torque_nm / FLYWHEEL_KG_M2 * (now_s - before_s)
+            self.angle_rad += self.velocity_rad_s * (now_s - before_s)
+            self.drive.measure(self.angle_rad, self.velocity_rad_s)
+            for frame in (*answers, *self.drive.cyclic_frames(now_s)):
+                self._bus.send(message_from(frame))
             before_s = now_s
 
     def start(self) -> None:
-        for drive in self.drives:
-            drive.reset(time.monotonic())
+        self.drive.reset(time.monotonic())
         self._thread.start()
 
     def end(self) -> None:
@@ -107,15 +102,10 @@ class DriveReader:
 
 
 @contextmanager
-def vendor_bench(type_name: str, count: int = 1, fd: bool = False, **changes: Any) -> Iterator[VendorBench]:
-    """Yield a bench with drives of ids 1, 2, ... on a bus of their own."""
-    drives = [
-        make_simulated_drive(
-            SimulatedDriveParameters(node_id, type=type_name, **{"current_noise_a": 0.0} | changes), Random(node_id)
-        )
-        for node_id in range(1, count + 1)
-    ]
-    bench = VendorBench(f"{type_name} {time.monotonic_ns()}", drives, fd)
+def vendor_bench(type_name: str, fd: bool = False, **changes: Any) -> Iterator[VendorBench]:
+    """Yield a bench with a drive of id 1 on a bus of its own."""
+    drive = simulated(type_name, 1, **{"current_noise_a": 0.0} | changes)
+    bench = VendorBench(f"{type_name} {time.monotonic_ns()}", drive, fd)
     bench.start()
     try:
         yield bench
