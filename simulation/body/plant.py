@@ -181,18 +181,15 @@ class Arm:
         coulomb_nm, disturbances = self.parameters.joint_coulomb_nm, self.parameters.disturbances
         sweep_dry_nm = coulomb_nm + disturbances.sweep_friction_nm
         lift_dry_nm = coulomb_nm + disturbances.adduction_friction_nm
-        self.sweep_velocity_rad_s += dt_s * sweep_nm / sweep_inertia_kg_m2
-        self.adduction_velocity_rad_s += dt_s * lift_nm / lift_inertia_kg_m2
+        sweep_rad_s = self.sweep_velocity_rad_s + dt_s * sweep_nm / sweep_inertia_kg_m2
+        lift_rad_s = self.adduction_velocity_rad_s + dt_s * lift_nm / lift_inertia_kg_m2
         if sweep_dry_nm:
-            self.sweep_velocity_rad_s = slowed(self.sweep_velocity_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
+            sweep_rad_s = slowed(sweep_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
         if lift_dry_nm:
-            loss_rad_s = dt_s * lift_dry_nm / lift_inertia_kg_m2
-            self.adduction_velocity_rad_s = slowed(self.adduction_velocity_rad_s, loss_rad_s)
-        self.sweep_rad, self.sweep_velocity_rad_s = _moved(
-            self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
-        )
+            lift_rad_s = slowed(lift_rad_s, dt_s * lift_dry_nm / lift_inertia_kg_m2)
+        self.sweep_rad, self.sweep_velocity_rad_s = _moved(self.sweep_rad, sweep_rad_s, dt_s, END_STOPS_RAD[0])
         self.adduction_rad, self.adduction_velocity_rad_s = _moved(
-            self.adduction_rad, self.adduction_velocity_rad_s, dt_s, END_STOPS_RAD[1]
+            self.adduction_rad, lift_rad_s, dt_s, END_STOPS_RAD[1]
         )
 
 

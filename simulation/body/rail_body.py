@@ -7,6 +7,7 @@ damping of half of critical for the paper's body, so that nothing rings. While t
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from control.limits import clip
 from control.records import TWO_FLIPPERS, Rig
 from simulation.mud.carriage import Carriage, Vector
 from simulation.mud.flipper_contact import ContactForce
@@ -69,9 +70,9 @@ class DryDrag:
     def step(self, dt_s: float, speed_m_s: float, largest_n: float) -> float:
         """Return the force on a body that moves at `speed_m_s`."""
         self._stretch_m += dt_s * speed_m_s
-        elastic_n = min(max(-DRAG_STIFFNESS_N_M * self._stretch_m, -largest_n), largest_n)
+        elastic_n = clip(-DRAG_STIFFNESS_N_M * self._stretch_m, -largest_n, largest_n)
         self._stretch_m = -elastic_n / DRAG_STIFFNESS_N_M
-        return min(max(elastic_n - DRAG_DAMPING_N_S_M * speed_m_s, -largest_n), largest_n)
+        return clip(elastic_n - DRAG_DAMPING_N_S_M * speed_m_s, -largest_n, largest_n)
 
 
 class DragPad(NamedTuple):

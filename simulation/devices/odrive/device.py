@@ -217,17 +217,19 @@ class SimulatedOdrive(SimulatedDrive):
         return torque_nm
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
-        for index, (period_s, messages) in enumerate(self._schedule):
-            if now_s < self._due_s[index]:
+        due_s, repeats = self._due_s, self.parameters.repeated_fraction
+        for index, message_due_s in enumerate(due_s):
+            if now_s < message_due_s:
                 continue
-            self._due_s[index] += period_s
-            if self._due_s[index] <= now_s:  # delayed by more than a period: lost messages are not sent later
-                self._due_s[index] = now_s + period_s
+            period_s, messages = self._schedule[index]
+            due_s[index] = message_due_s + period_s
+            if due_s[index] <= now_s:  # delayed by more than a period: lost messages are not sent later
+                due_s[index] = now_s + period_s
             for message in messages:
                 encode = self._payloads[message]
-                payload = self._new_or_repeated(message, encode) if message in REPEATED else encode()
+                payload = self._new_or_repeated(message, encode) if repeats and message in REPEATED else encode()
                 yield Frame(self._ids[message], payload, stamp_s=now_s)
-        self._next_due_s = min(self._due_s)
+        self._next_due_s = min(due_s)
 
     def _encoder(self) -> bytes:
         return codec.GET_ENCODER_ESTIMATES.encode(self._measured_angle(), self._measured_speed())
