@@ -5,11 +5,16 @@ report with what is possible have nothing to find, and cost a third of the loop.
 """
 
 from control.faults import Fault
+from control.records import Torques
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.ticker import Tick
 
 
 class LoadMonitor(FaultMonitor):
+    def with_probes(self, wanted: Torques, largest_nm: float) -> Torques:
+        """Return the wanted torques: nothing here is probed."""
+        return wanted
+
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
         facts, found = self._facts(tick, monitor_input), list[Fault]()
         for joint, state, torque_nm in zip(
