@@ -46,6 +46,7 @@ from estimation.strokes.stroke_fit import (
 from estimation.strokes.surface import NO_SURFACE, Surface, find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
 from estimation.strokes.tare import Tare, Zero
+from estimation.strokes.withstood import SHALLOWEST_M
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.001}
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
@@ -285,7 +286,8 @@ class FlipperEstimator(StrideEstimator):
         yield
         rising = extraction.moving()
         if stride.along_path and self.base is Base.FREE and shear.fit is not None:
-            rising = slide_free(self.geometry, rising, surface.depth_m, shear.fit.slope)
+            under_m = max(stride.deepest_m - surface.depth_m, SHALLOWEST_M)
+            rising = slide_free(self.geometry, rising, surface.depth_m, shear.fit.slope, under_m)
         k_e = yield from self._learn_extraction(stride, rising)
         yield
         force_n, force_error_n = yield_force_n(self.geometry, stance.batches, shear, stride.friction_error_nm)

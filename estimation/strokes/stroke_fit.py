@@ -18,6 +18,7 @@ from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate_integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
+from estimation.strokes.depth_line import SHEAR_LAW
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
 from estimation.strokes.scatter_memory import ScatterMemory
@@ -36,6 +37,7 @@ CROSS_COUPLING_UNCERTAINTY = 0.12
 LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
 HELD_BATCHES = 3  # in a row, 6 mm of rise, that must withstand a bound
 BATCHES_PER_UNIT = 10  # of bounded work
+SIDE_YIELDS = 0.2  # of the plate's thickness: Matlock's 4 times 2.5 ε b, with ε = 0.02 of soft clay
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
@@ -257,23 +259,39 @@ def levelling_m(surface: Surface) -> float:
     return sqrt(max(0.0, surface.std_error_m**2 - surface.own_error_m**2))
 
 
-def slide_free(geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, k_s: float) -> list[Batch]:
+def slide_free(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, k_s: float, deepest_m: float
+) -> list[Batch]:
     """Return the batches of a path with the torque on the narrow sides that a standing body would give.
 
     A plate that its arc alone moves slides outward as it rises. The body's advance dx adds dx sin α, which is inward at
-    the rear. Where it prevails the other narrow side leads: it meets the pressure k_s ζ of a plate that is swept, and
-    pushes the flipper up instead of holding it down. Without a pose nothing is known of it.
+    the rear. Where it prevails, the other narrow side leads once it has slid SIDE_YIELDS: it meets the pressure of mud
+    that has this k_s at `deepest_m`, and pushes the flipper up instead of holding it down. Without a pose nothing is
+    known of it.
     """
-    freed, drop_m = list(batches[:1]), geometry.drop_m
+    freed, drop_m, thickness_m, held = list(batches[:1]), geometry.drop_m, geometry.plate_thickness_m, 0.0
     for before, batch in zip(batches, batches[1:], strict=False):
-        arc_rad, side_nm = cos(batch.sweep_rad) * (batch.adduction_rad - before.adduction_rad), 0.0
-        outward_m, slide_m = drop_m * arc_rad, sin(batch.sweep_rad) * (batch.body_m - before.body_m)
-        if outward_m * (outward_m + slide_m) < 0.0:
-            depth_m = max(0.0, batch.travel_m - surface_m)
-            side_n = k_s * geometry.plate_thickness_m * depth_m**2 / 2.0
-            side_nm = copysign(2.0 * side_n * (drop_m - depth_m / 3.0) * cos(batch.sweep_rad), arc_rad)
-        freed.append(batch._replace(adduction_nm=batch.adduction_nm - side_nm))
+        depth_m, reach = batch.travel_m - surface_m, cos(batch.sweep_rad)
+        outward_m = drop_m * reach * (batch.adduction_rad - before.adduction_rad)
+        slide_m = outward_m + sin(batch.sweep_rad) * (batch.body_m - before.body_m)
+        held = min(max(held + slide_m / (SIDE_YIELDS * thickness_m), -1.0), 1.0)
+        if depth_m > 0.0 and isfinite(held):
+            pressed_n = k_s * (depth_m / deepest_m) ** SHEAR_LAW.exponent * thickness_m * depth_m**2 / 2.0
+            missing_n = (copysign(1.0, outward_m) - held) * _narrowness(geometry, depth_m) * pressed_n
+            missing_nm = missing_n * (drop_m - depth_m / 3.0) * reach
+            batch = batch._replace(adduction_nm=batch.adduction_nm - missing_nm)
+        freed.append(batch)
     return freed
+
+
+def _narrowness(geometry: FlipperGeometry, depth_m: float) -> float:
+    """Return the pressure of clay on a narrow side over that on a face, down to a depth (Matlock 1970).
+
+    On a body of the width b the pressure at the depth z is (3 + J z/b) times the strength, at most 9 times; J = 0.5.
+    """
+    widths_m = geometry.plate_thickness_m, geometry.plate_width_m
+    side, face = (min(3.0 + 0.5 * depth_m / (2.0 * width_m), 9.0) for width_m in widths_m)
+    return side / face
 
 
 def level_free(batches: Sequence[Batch], level_nm: float) -> list[Batch]:
