@@ -10,7 +10,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from drivers.can.can_port import CanPort, open_port
+from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.drive_types import make_drives
@@ -21,10 +21,8 @@ from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.drivers.can.slcan_adapter import SlcanAdapter
+from tests.drivers.can.slcan_adapter import OPENING_LINES, SlcanAdapter
 from tests.waiting import wait_until
-
-OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
 
 
 class Line:
@@ -33,7 +31,7 @@ class Line:
     def __init__(self, end: CanPort) -> None:
         assert isinstance(end, MockPort)
         self.adapter = SlcanAdapter(end)
-        self.port = open_port("slcan", self.adapter.device, {"bitrate": 1000000, "sleep_after_open": 0.0})
+        self.port = self.adapter.open_port()
         self.plugged = True
         self._lines, self._read_bytes = OPENING_LINES, 0
         self._send = self.port.send

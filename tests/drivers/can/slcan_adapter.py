@@ -9,13 +9,14 @@ robot is reached through the bytes of a real adapter. The owner calls `step`.
 
 import re
 
-from drivers.can.can_port import CanPort
+from drivers.can.can_port import CanPort, open_port
 from drivers.can.frames import Frame
 from simulation.devices.pseudo_terminal import PseudoTerminal
 
 END, REFUSED = b"\r", b"\a"
 FRAME_LINE = re.compile(rb"([tr][0-7][0-9A-Fa-f]{2}|[TR][01][0-9A-Fa-f]{7})([0-8])((?:[0-9A-Fa-f]{2})*)")
 LONGEST_LINE_BYTES = 32
+OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
 ANSWERS = {b"V": b"V1013", b"N": b"NA123", b"F": b"F00"}
 
 
@@ -104,3 +105,7 @@ class SlcanAdapter:
 
     def unplug(self) -> None:
         self._terminal.close()
+
+    def open_port(self) -> CanPort:
+        """Return the daemon's port of this adapter."""
+        return open_port("slcan", self.device, {"bitrate": 1000000, "sleep_after_open": 0.0})

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.records import NEVER_S
-from drivers.can.can_port import CanPort, SlcanPort, open_port
+from drivers.can.can_port import SlcanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.can.port_health import BusState
-from tests.drivers.can.slcan_adapter import SlcanAdapter
+from tests.drivers.can.slcan_adapter import OPENING_LINES, SlcanAdapter
 from tests.waiting import shortest_wait_s, wait_until
 
 FRAMES = [
@@ -22,8 +22,6 @@ FRAMES = [
     Frame(0x18FEF100, is_remote=True, is_extended=True),
 ]
 LINES = [b"t00980001020304050607\r", b"t7FF0\r", b"r0600\r", b"T18FEF1001FF\r", b"R18FEF1000\r"]
-OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
-OPTIONS: dict[str, str | int | float | bool] = {"bitrate": 1000000, "sleep_after_open": 0.0}
 
 
 class Bench:
@@ -33,7 +31,7 @@ class Bench:
         bus = MockBus()
         self.node = bus.open()
         self.adapter = SlcanAdapter(bus.open())
-        self.port: CanPort = open_port("slcan", self.adapter.device, OPTIONS)
+        self.port = self.adapter.open_port()
         self.read_bytes = 0
         wait_until(lambda: stepped(self.adapter).heard_lines == OPENING_LINES)
         self.settle()
