@@ -26,7 +26,7 @@ from drivers.power_switch import PowerSwitch
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.lease import Lease
-from firmware_host.log.recorder import NullRecorder, Recording
+from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import TICK_KIND, tick_kind, tick_row
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
@@ -243,22 +243,21 @@ class Loop:
 
     def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s
-        if type(self.recorder) is not NullRecorder:  # a row that it would drop is not packed
-            row = tick_row(
-                self._tick_kind,
-                tick,
-                sent_after_s,
-                states=self.states,
-                sent=self.sent,
-                loads=self.learning.loads,
-                target=self.target,
-                stride_depth_m=self.stride_depth_m,
-                body=self.body,
-                missed_ticks=self.missed_ticks,
-                mode=self.mode,
-                power_cut=self.fault_monitor.power_cut != "",
-            )
-            self.recorder.put(TICK_KIND, row)
+        row = tick_row(
+            self._tick_kind,
+            tick,
+            sent_after_s,
+            states=self.states,
+            sent=self.sent,
+            loads=self.learning.loads,
+            target=self.target,
+            stride_depth_m=self.stride_depth_m,
+            body=self.body,
+            missed_ticks=self.missed_ticks,
+            mode=self.mode,
+            power_cut=self.fault_monitor.power_cut != "",
+        )
+        self.recorder.put(TICK_KIND, row)
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
