@@ -33,7 +33,7 @@ def ask(drive: SimulatedMit, data: bytes = codec.LEAVE, now_s: float = 0.0) -> A
 
 def test_it_sends_nothing_but_one_answer_to_each_command_with_the_values_of_before(drive: SimulatedMit) -> None:
     assert list(drive.cyclic_frames(0.1)) == []
-    assert drive.receive(Frame(7, bytes(3)), 0.1) == []  # malformed
+    assert drive.receive(Frame(codec.REGISTER_ID, bytes(4)), 0.1) == []  # malformed
     assert drive.receive(Frame(8, codec.LEAVE), 0.1) == [] == drive.receive(Frame(23, codec.LEAVE), 0.1)
     ask(drive, codec.encode_torque(0.5, 10.0))
     assert ask(drive, codec.ENTER).status == codec.DISABLED
