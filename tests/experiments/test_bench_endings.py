@@ -12,16 +12,12 @@ from control.controller import UP_RAD
 from control.modes import ENERGISED, Mode
 from control.parameters.fault_bounds import FaultBounds
 from control.records import Phase
-from drivers.fault_injection.failures import Failures
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.bench_robot import arm, ask_to_clear_faults, leave, move, rest, walk
+from experiments.robot.bench_robot import arm, leave, move, rest, walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.prompt import AutomaticOperator
 from logs.files.log_reader import read_log
-from simulation.harness.file_recorder import FileRecorder
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
+from tests.experiments.robot.test_lockstep_robot import make_robot
 
 OPERATOR = AutomaticOperator(lambda message: None)
 ARMED_S = 0.01  # before all drives have reported closed loop
@@ -55,10 +51,9 @@ class InterruptedRobot(LockstepRobot):
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Iterator[InterruptedRobot]:
-    configuration = replace(simulated_configuration(), faults=FaultBounds())
-    recorder = FileRecorder(tmp_path / "log.mcap", configuration)
-    track, failures = Track([(5.0, MUDS["48.5"])]), Failures(configuration.bus)
-    made = InterruptedRobot(Lockstep(configuration, track, recorder=recorder, failures=failures), recorder)
+    made = make_robot(tmp_path, replace(simulated_configuration(), faults=FaultBounds()))
+    made.__class__ = InterruptedRobot
+    assert isinstance(made, InterruptedRobot)
     yield made
     made.close()
 
@@ -112,18 +107,6 @@ def test_flippers_in_the_mud_are_raised_before_the_torque_goes_off_after_a_fault
     rest(robot)
     robot.close()
     assert np.abs(last_angles_rad(tmp_path)).max() < UP_RAD
-
-
-def test_the_next_trial_begins_after_a_fault_of_the_last_one(robot: InterruptedRobot) -> None:
-    arm(robot, OPERATOR)
-    robot.lockstep.robot.restart_drive(0)
-    with pytest.raises(BenchError):
-        walk(robot, 0.03, 1)
-    rest(robot)
-    robot.wait(3.0)
-    ask_to_clear_faults(robot, OPERATOR)
-    arm(robot, OPERATOR)
-    assert robot.call("status")["mode"] == "hold"
 
 
 def test_a_flipper_that_sinks_as_the_robot_is_armed_only_delays_it(robot: InterruptedRobot) -> None:

@@ -8,10 +8,9 @@ import pytest
 
 from experiments.actuator import simulation as actuator_simulation
 from experiments.actuator.friction import friction_of, loop_of, swing_arm
-from experiments.actuator.plan import WeighingPlan
-from experiments.actuator.reading import HeldJoint, HeldSample, MovedError
-from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
-from experiments.robot.bench_robot import arm
+from experiments.actuator.reading import HeldSample, MovedError
+from experiments.actuator.simulation import TRUE_CONSTANT_NM_A
+from tests.experiments.actuator.test_reading import held_arm
 
 HALF_RAD, DRY_A, VISCOUS_A_S = 0.09, 0.18, 0.03
 
@@ -60,19 +59,11 @@ def test_a_blocked_arm_makes_no_loop() -> None:
 
 def test_a_simulated_joint_has_the_friction_that_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(actuator_simulation, "COULOMB_NM", 0.03)
-    joint = "right_sweep"
-    robot, hand = simulated_bench(bench_configuration(), joint, WeighingPlan((joint,)), 6, tmp_path / "log.mcap")
-    try:
-        hand.hold_level(lambda: None)
-        arm(robot)
-        hand.release(lambda: None)
-        held = HeldJoint(robot, joint)
+    with held_arm("right_sweep", 6, tmp_path) as (robot, _, held):
         middle_rad = held.held_rad
         dry_a, dry_error_a, viscous_a_s, viscous_error_a_s = friction_of(swing_arm(held) + swing_arm(held))
         assert held.held_rad == pytest.approx(middle_rad)
         viscous_nm_s = robot.lockstep.robot.plant.parameters.joint_friction_nm_s
-    finally:
-        robot.close()
     assert dry_error_a * TRUE_CONSTANT_NM_A < 0.0015
     assert abs(dry_a - 0.03 / TRUE_CONSTANT_NM_A) < 2.0 * dry_error_a
     assert abs(viscous_a_s - viscous_nm_s / TRUE_CONSTANT_NM_A) < 2.0 * viscous_error_a_s

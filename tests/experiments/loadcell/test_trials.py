@@ -1,4 +1,4 @@
-"""Trials are measured, checked and recovered over the serial port of an emulated amplifier."""
+"""Trials are measured, checked and recovered over the serial ports of an emulated amplifier and a stage's encoder."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from experiments.loadcell.preparation import CellSettings, examine_lines
+from experiments.loadcell.preparation import CellSettings, examine_encoder, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, load_counted
 from experiments.loadcell.stage import CellTrial, Stage
 from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
-from experiments.loadcell.trials import list_problems, record
+from experiments.loadcell.trials import KEEP, WITHOUT, list_problems, record
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON, REDO, SKIP
-from simulation.test_rig.emulated_instruments import AmplifierParameters
-from tests.experiments.loadcell.loadcell_bench import SETTINGS, Make, laboratories
+from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedStageEncoder, StageEncoderParameters
+from tests.experiments.loadcell.loadcell_bench import SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
 
@@ -156,3 +156,75 @@ def test_the_stage_prompts_for_every_step_and_attends_the_ports_meanwhile() -> N
     stage.lift()
     stage.start(CellTrial("a", INSERTION, 1))
     assert len(drained) == 4
+
+
+# the encoder of the stage
+
+
+@pytest.fixture
+def make_with_encoder(make: Make) -> Make:
+    def build(operator: ScriptedOperator | None = None, **parameters: Any) -> Laboratory:
+        return make(operator, encoder=StageEncoderParameters(**parameters))
+
+    return build
+
+
+def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
+    assert laboratory.bench.encoder is not None
+    return laboratory.bench.encoder
+
+
+def examine(laboratory: Laboratory) -> None:
+    laboratory.cell.listen(2.0)
+    examine_encoder(laboratory.cell)
+
+
+def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make_with_encoder: Make) -> None:
+    laboratory = make_with_encoder(ScriptedOperator(KEEP))
+    laboratory.at(4.5, counter_of(laboratory).unplug)
+    laboratory.at(6.0, counter_of(laboratory).plug_in)
+    assert any("encoder was unplugged or restarted" in each for each in laboratory.try_once())
+    (recorded,) = load_counted(laboratory.folder, laboratory.notebook, SETTINGS)
+    assert recorded.positions is None and len(recorded.forces_n) > 400
+    assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
+    assert laboratory.encoder is not None and laboratory.encoder.line.is_there
+
+
+def test_an_unplugged_encoder_is_asked_for_and_then_left_out(make_with_encoder: Make) -> None:
+    laboratory = make_with_encoder(ScriptedOperator(GO_ON, WITHOUT, KEEP))
+    counter_of(laboratory).unplug()
+    reported = laboratory.try_once()
+    assert [("encoder is unplugged" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
+    assert reported[2].startswith("going on without the position")
+    assert "position" not in laboratory.notebook.entries["lawful/insertion/1"]
+
+
+def test_a_drop_out_in_the_stroke_is_reported(make_with_encoder: Make) -> None:
+    laboratory = make_with_encoder(ScriptedOperator(KEEP))
+    laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
+    reported = laboratory.try_once()
+    assert any("position is unknown" in each or "the position is not used" in each for each in reported)
+
+
+@pytest.mark.parametrize(
+    ("encoder", "line", "option"),
+    [
+        ({"baud": 57600}, None, "--position-baud"),
+        ({"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}, None, "nothing arrives"),
+        ({}, b"12.5 mm\r\n", "--position-label"),
+    ],
+)
+def test_lines_of_an_encoder_that_cannot_be_read_are_refused_with_what_to_do(
+    make_with_encoder: Make, encoder: dict[str, Any], line: bytes | None, option: str
+) -> None:
+    laboratory = make_with_encoder(**encoder)
+    if line is not None:
+        counter_of(laboratory).line_at = lambda at_s: line
+    with pytest.raises(BenchError, match=f"{option}.*or continue without --position"):
+        examine(laboratory)
+
+
+def test_an_encoder_too_slow_for_the_stroke_is_reported(make_with_encoder: Make) -> None:
+    laboratory = make_with_encoder(rate_hz=20.0)
+    examine(laboratory)
+    assert "20 lines/s, one per 5.0 mm" in laboratory.operator.reported[0]

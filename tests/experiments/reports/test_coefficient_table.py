@@ -133,7 +133,6 @@ def test_a_mud_is_found_however_its_name_is_written_and_bounds_are_left_out(tmp_
         {"muds": [1]},
         {"muds": [{"k_p": {"value": 1.0}}]},
         {"muds": [{"mud": "a", "k_p": {"value": -1.0}}]},
-        {"muds": [{"mud": "a", "k_p": {"value": "much"}}]},
         {"muds": [{"mud": "a", "k_p": 3.0}]},
     ],
 )

@@ -1,6 +1,6 @@
 """An experiment operates a simulated robot through the daemon's calls, and the log contains what it did."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -61,19 +61,34 @@ def test_a_walk_comes_back_with_its_strides_and_its_rows(robot: LockstepRobot, t
     assert read_log(log).complete
 
 
-def test_a_walk_that_another_program_stops_is_not_complete(
-    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
+def stop(robot: LockstepRobot) -> None:
+    robot.call("stop")
+
+
+def restart_right_sweep(robot: LockstepRobot) -> None:
+    robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+
+
+@pytest.mark.parametrize(
+    ("end", "why"),
+    [
+        (stop, "ended early, after [1-3] of 4 strides"),
+        (restart_right_sweep, "the walk ended early: stopped by .*right_sweep"),
+    ],
+)
+def test_a_walk_that_another_program_or_a_fault_ends_is_not_complete(
+    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch, end: Callable[[LockstepRobot], None], why: str
 ) -> None:
     arm(robot)
-    wait, stopped_s = robot.wait, robot.lockstep.now_s + 5.0
+    wait, ended_s = robot.wait, robot.lockstep.now_s + 5.0
 
-    def stopping(duration_s: float) -> None:
+    def ending(duration_s: float) -> None:
         wait(duration_s)
-        if robot.lockstep.now_s > stopped_s and robot.call("status")["mode"] == "walking":
-            robot.call("stop")
+        if robot.lockstep.now_s > ended_s and robot.call("status")["mode"] == "walking":
+            end(robot)
 
-    monkeypatch.setattr(robot, "wait", stopping)
-    with pytest.raises(BenchError, match="ended early, after [1-3] of 4 strides"):
+    monkeypatch.setattr(robot, "wait", ending)
+    with pytest.raises(BenchError, match=why):
         walk(robot, 0.03, 4)
 
 
@@ -89,27 +104,11 @@ def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRob
         move(robot, {"right_adduction": 0.1})
 
 
-def test_a_fault_that_ends_a_walk_is_reported_with_its_message(
-    robot: LockstepRobot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    arm(robot)
-    pulled_s = robot.lockstep.now_s + 2.0
-
-    def wait(duration_s: float) -> None:
-        if robot.lockstep.now_s > pulled_s:
-            robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
-        robot.lockstep.run_for(duration_s)
-
-    monkeypatch.setattr(robot, "wait", wait)
-    with pytest.raises(BenchError, match="the walk ended early: stopped by .*right_sweep"):
-        walk(robot, 0.03, 1)
-
-
 @pytest.fixture
 def faulty(robot: LockstepRobot) -> LockstepRobot:
     """Return a robot in FAULT: a drive was restarted under torque some seconds ago."""
     arm(robot)
-    robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
+    restart_right_sweep(robot)
     robot.wait(3.0)
     assert robot.call("status")["mode"] == "fault"
     return robot

@@ -47,10 +47,8 @@ SLOW = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.
 @pytest.mark.parametrize(
     ("strides", "end"),
     [
-        ([], ""),
         ([stride("45.3", 1.62, 0.12)], ""),
         ([stride("45.3", 1.62, 0.13)], "past the end"),
-        ([stride("45.3", 1.62, 0.14)], "past the end"),
         (SLOW, ""),
         ([*SLOW, stride("b", 0.7, 0.0, 2.0)], "stuck in b"),
     ],

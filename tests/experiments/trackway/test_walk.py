@@ -42,7 +42,6 @@ GOOD = WalkedStride("firm", 0.0, 0.03, 0.12, 1.6, 0.0)
         (0.12, 0.0, False, ""),
         (0.06, 0.0, False, ""),  # half an arm
         (0.0599, 0.0, False, SLIPPAGE),
-        (-0.01, 0.0, False, SLIPPAGE),
         (0.12, 0.01, False, ""),  # a normal extraction pushes the body back as much
         (0.12, 0.0101, False, EXTRACTION),
         (0.01, 0.08, False, EXTRACTION),  # the body lost its advance
