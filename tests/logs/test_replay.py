@@ -34,12 +34,16 @@ def same(live: StrideEstimate, replayed: StrideEstimate) -> bool:
     return repr(dataclasses.astuple(live)) == repr(dataclasses.astuple(replayed))
 
 
+def same_strides(robot: Lockstep, paths: list[Path], configuration: Configuration | None = None) -> list[bool]:
+    """Return for each stride whether its replay agrees with the robot's own estimate."""
+    live = [stride.estimate for stride in robot.loop.learning.strides]
+    replayed = replay_files(paths, configuration).strides
+    return [same(one, other) for one, other in zip(live, replayed, strict=True)]
+
+
 def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(walked_twice: tuple[Path, Lockstep]) -> None:
     path, robot = walked_twice  # the second walk in one log begins afresh
-    live = [stride.estimate for stride in robot.loop.learning.strides]
-    replayed = replay_files([path]).strides
-    assert len(live) == len(replayed) == 6
-    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+    assert same_strides(robot, [path]) == [True] * 6
 
 
 def test_a_log_carries_the_shape_of_the_plate(tmp_path: Path, example_text: str) -> None:
@@ -48,12 +52,8 @@ def test_a_log_carries_the_shape_of_the_plate(tmp_path: Path, example_text: str)
     text = "\n".join(lines).replace("[geometry]", f"[geometry]\nplate_corners_m = {toml_value(corners)}")
     path = tmp_path / "walk.mcap"
     robot = record_walks(path, parse_configuration(calibrated(text)), 1)
-    live = [stride.estimate for stride in robot.loop.learning.strides]
-    replayed = replay_files([path]).strides
-    assert len(live) == len(replayed) > 0
-    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
-    rectangle = replay_files([path], parse_configuration(example_text)).strides
-    assert not any(same(one, other) for one, other in zip(live, rectangle, strict=True))
+    assert same_strides(robot, [path]) == [True] * 2
+    assert same_strides(robot, [path], parse_configuration(example_text)) == [False] * 2
 
 
 def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
@@ -72,10 +72,7 @@ def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     paths = log_files(tmp_path, DONE)
     assert len(paths) > 3
     assert len(read_logs(paths).ticks) < robot.tick_number - 1000
-    live = [stride.estimate for stride in robot.loop.learning.strides]
-    replayed = replay_files(paths).strides
-    assert len(live) == len(replayed) == 2
-    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+    assert same_strides(robot, paths) == [True] * 2
 
 
 # First strokes in undisturbed mud, ranges over all trials measured with the published formula: mud-physics 1.5. The

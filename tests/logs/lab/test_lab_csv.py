@@ -171,27 +171,26 @@ def test_states_become_phases(tmp_path: Path) -> None:
     assert log.flippers == ()
 
 
-def test_lost_poses_are_not_positions(tmp_path: Path) -> None:
-    """An old pose that is held until tracking returns, and zeros, do not count as positions."""
-    body_m = [0.8] * 10 + [0.1, 0.11, 0.12, 0.0, 0.13, 0.14]
+@pytest.mark.parametrize(
+    ("body_m", "known_m"),
+    [
+        ([0.8] * 10 + [0.1, 0.11, 0.12, 0.0, 0.13], [math.nan] * 10 + [0.1, 0.11, 0.12, math.nan, 0.13]),
+        ([0.1] * 10 + [0.101, 0.102], [0.1] * 10 + [0.101, 0.102]),  # at rest
+    ],
+)
+def test_a_pose_that_is_held_until_tracking_returns_and_zero_are_no_positions(
+    body_m: list[float], known_m: list[float], tmp_path: Path
+) -> None:
     rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m},0,0" for number, x_m in enumerate(body_m)]
     head = HEAD + ",OptitrackPosition_x,OptitrackPosition_y,OptitrackPosition_z"
-    log = read_lab_csv(write(tmp_path / "lost.csv", head, *rows))
-    np.testing.assert_allclose(log.body_x_m, [math.nan] * 10 + [0.1, 0.11, 0.12, math.nan, 0.13, 0.14])
-
-
-def test_a_body_at_rest_does_not_count_as_lost(tmp_path: Path) -> None:
-    body_m = [0.1] * 10 + [0.101, 0.102]
-    rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m}" for number, x_m in enumerate(body_m)]
-    log = read_lab_csv(write(tmp_path / "rest.csv", HEAD + ",OptitrackPosition_x", *rows))
-    np.testing.assert_allclose(log.body_x_m, body_m)
+    log = read_lab_csv(write(tmp_path / "pose.csv", head, *rows))
+    np.testing.assert_allclose(log.body_x_m, known_m)
 
 
 GOOD = [ROW.format(number / 10, number / 100) for number in range(5)]
 MALFORMED = {
     "nothing": ([], "none of the first 11 lines names the columns time and turtle_state"),
     "only a head": ([HEAD], "ends at line 2, which names the columns"),
-    "no time column": ([HEAD.replace("time,", "t,"), *GOOD], "names the columns time and turtle_state"),
     "a missing column": ([HEAD.replace("_curr", ""), *GOOD], "there is no column leftsweeping_curr"),
     "a short row": ([HEAD, *GOOD, "1,2,3", *GOOD], "line 8 has 3 fields, the columns are 10"),
     "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, the columns are 10"),
