@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import mudskipper
@@ -27,8 +29,13 @@ def run_example(name: str, *arguments: str, **environment: str) -> str:
     return ended.stdout
 
 
-def test_a_log_is_arrays_by_field_name() -> None:
-    log, read = mudskipper.open_log(LOG), read_log(LOG)
+@pytest.fixture(scope="module")
+def log() -> mudskipper.OpenedLog:
+    return mudskipper.open_log(LOG)
+
+
+def test_a_log_is_arrays_by_field_name(log: mudskipper.OpenedLog) -> None:
+    read = read_log(LOG)
     assert log.ticks["angle_rad"].shape == (len(read.ticks), 4)
     assert log.ticks["phase"].max() >= Phase.SWING
     assert log.strides["k_p"].tolist() == [stride["k_p"] for stride in read.strides]
@@ -37,6 +44,32 @@ def test_a_log_is_arrays_by_field_name() -> None:
     assert log.complete and not log.unknown_fields
     shown = str(log).splitlines()
     assert len(shown) <= 10 and f"{len(log.ticks)} rows" in str(log) and "whole" in shown[-1]
+
+
+def test_ticks_become_a_table_with_a_column_for_each_joint(log: mudskipper.OpenedLog) -> None:
+    frame = log.ticks.to_pandas()
+    assert isinstance(frame, pd.DataFrame) and len(frame) == len(log.ticks)
+    assert frame["right_adduction_angle_rad"].tolist() == log.ticks["angle_rad"][:, 3].tolist()
+    assert frame.attrs["units"]["right_adduction_angle_rad"] == "rad"
+    stance = frame[frame["phase"] == "stance"]
+    assert len(stance) == np.count_nonzero(log.ticks["phase"] == Phase.STANCE)
+
+
+def test_strides_and_events_become_tables(log: mudskipper.OpenedLog) -> None:
+    assert log.strides.to_pandas().groupby("flipper", observed=True)["k_s"].count().to_dict() == {"left": 3, "right": 3}
+    assert log.events.to_pandas()["text"].str.startswith("request walk").sum() == 1
+
+
+def test_selected_rows_become_a_table_too_with_their_time(log: mudskipper.OpenedLog) -> None:
+    walking = log.ticks[log.ticks["stride"] >= 0]
+    frame = walking.to_pandas()
+    assert len(frame) == len(walking) < len(log.ticks)
+    assert frame.index[0] == log.ticks.to_pandas().index[int(np.argmax(log.ticks["stride"] >= 0))]
+    assert str(frame.index[0])[:19] == "2026-11-22 14:50:22" and str(frame.index.tz) == "UTC"
+
+
+def test_a_column_is_a_plain_array(log: mudskipper.OpenedLog) -> None:
+    assert type(log.ticks["stamp_s"]) is type(log.ticks["angle_rad"]) is np.ndarray
 
 
 def test_a_log_without_strides_has_their_fields(tmp_path: Path) -> None:
@@ -50,16 +83,6 @@ def test_a_replay_is_that_of_the_command() -> None:
     expected = repr(replay_files([LOG]).strides)  # as text, because NaN is not equal to NaN
     assert repr(mudskipper.replay(LOG).strides) == expected
     assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
-
-
-def test_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(mudskipper.LogError):
-        mudskipper.open_log(tmp_path / "none.mcap")
-
-
-def test_without_a_daemon_the_client_says_so(short_folder: Path) -> None:
-    with pytest.raises(mudskipper.NoDaemonError):
-        mudskipper.Client(short_folder / "none.sock")
 
 
 def test_forces_are_plotted(tmp_path: Path) -> None:

@@ -46,19 +46,19 @@ def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
 
 
-def test_a_refusal_has_the_daemon_s_message(ends: Ends) -> None:
-    with pytest.raises(CallRefusedError, match="^arm first$"):
-        answer(ends, [rpc.RESPONSE, 1, "arm first", None])
-
-
-def test_a_refusal_for_missing_rights_has_its_own_type(ends: Ends) -> None:
-    with pytest.raises(NotPermittedError, match="^join$"):
-        answer(ends, [rpc.RESPONSE, 1, f"{rpc.NOT_PERMITTED}join", None])
-
-
-def test_a_rejection_without_a_number_answers_the_current_request(ends: Ends) -> None:
-    with pytest.raises(CallRefusedError, match=r"a request is \[0"):
-        answer(ends, [rpc.RESPONSE, None, rpc.SHAPE, None])
+@pytest.mark.parametrize(
+    ("number", "refusal", "raised", "message"),
+    [
+        (1, "arm first", CallRefusedError, "^arm first$"),
+        (None, rpc.SHAPE, CallRefusedError, r"a request is \[0"),  # the current request
+        (1, f"{rpc.NOT_PERMITTED}join", NotPermittedError, "^join$"),
+    ],
+)
+def test_a_refusal_has_the_daemon_s_message_and_for_missing_rights_its_own_type(
+    ends: Ends, number: int | None, refusal: str, raised: type[Exception], message: str
+) -> None:
+    with pytest.raises(raised, match=message):
+        answer(ends, [rpc.RESPONSE, number, refusal, None])
 
 
 @pytest.mark.parametrize("message", [5, None, [1, 2], "x" * 5000, {"a": 1}])
