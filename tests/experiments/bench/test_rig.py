@@ -1,6 +1,7 @@
 """The rig of the bench uses real buses in real time and refuses other programs that command the drives."""
 
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -22,6 +23,21 @@ from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
+
+
+@pytest.fixture
+def answering(short_folder: Path) -> Iterator[Path]:
+    """Yield a socket that accepts connections, like that of a running daemon."""
+    path = short_folder / "mudskipper.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        yield path
+
+
+def test_the_bench_does_not_open_while_a_daemon_runs(configuration: Configuration, answering: Path) -> None:
+    with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
+        HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
 
 
 def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, short_folder: Path) -> None:

@@ -235,9 +235,15 @@ def test_a_changed_file_is_refused_in_the_same_folder(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     interrupt_after(2, command, monkeypatch)
-    capsys.readouterr()
-    assert command(text=SHORT.replace("3000.0", "2000.0")) == exit_codes.REFUSED
-    assert "strength_pa = [1000.0, 2000.0]" in capsys.readouterr().err
+    for changed, differs in (
+        (SHORT.replace("3000.0", "2000.0"), "strength_pa = [1000.0, 2000.0]"),
+        (f"{SHORT}[configuration.adaptation]\nmethod = 'paper'", "method = paper"),
+        (f"{SHORT}[world.disturbances]\nclinging_n = 0.5", "clinging_n = 0.5"),
+    ):
+        capsys.readouterr()
+        assert command(text=changed) == exit_codes.REFUSED
+        assert differs in capsys.readouterr().err
+    assert command() == exit_codes.OK and len(rows(tmp_path)) == 4
 
 
 def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pandas import Series
 
 from control.records import Estimate
 from experiments.lablogs.repeatability import (
@@ -11,6 +12,7 @@ from experiments.lablogs.repeatability import (
     repeatability,
     scatter_between_strokes,
     scatter_between_trials,
+    separation,
     walk_scatter,
 )
 from tests.experiments.lablogs.synthetic_trials import INVALID, k_s_strokes, make_bound, make_value
@@ -82,6 +84,14 @@ def test_a_common_decline_is_no_scatter_and_without_repetitions_there_is_none() 
     once = k_s_strokes([[make_value(1.0), make_value(0.8), make_value(0.7)]])
     assert scatter_between_trials(once).chi is scatter_between_strokes(once).chi is None
     assert scatter_between_strokes(k_s_strokes([])).chi is None
+
+
+def test_separation_is_the_difference_in_pooled_deviations() -> None:
+    soft, firm = Series([0.9, 1.0, 1.1]), Series([1.7, 2.0, 2.3])  # deviations 0.1 and 0.3
+    pooled = ((0.1**2 + 0.3**2) / 2.0) ** 0.5
+    assert separation(firm, soft) == pytest.approx(1.0 / pooled)
+    assert separation(soft, firm) == pytest.approx(-1.0 / pooled)
+    assert separation(firm, soft[:1]) is None
 
 
 @pytest.mark.parametrize("claimed", [0.05, 0.02])

@@ -43,7 +43,6 @@ def shifted(turns: float) -> Change:
 
 REFUSED: dict[str, tuple[Change, str, str]] = {
     "radians": (scaled(math.tau), "leftsweeping_pos", "radians or degrees"),
-
     "one joint in radians": (scaled(math.tau, "rightadduction"), "rightadduction_pos", "radians or degrees"),
     "positions and currents": (swap_positions_and_currents, "leftsweeping_pos", "swapped"),
     "two joints": (swap_right_joints, "rightsweeping_pos", "are they swapped"),
