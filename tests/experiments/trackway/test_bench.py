@@ -1,6 +1,7 @@
 """Table I is measured through the daemon's calls; every walk stops in time, and its log gives the table."""
 
 import json
+from collections.abc import Iterator
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import BenchRobot
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.notebook import Notebook
 from experiments.study.prompt import SKIP
@@ -31,13 +33,14 @@ from tests.scripted_operator import ScriptedOperator
 
 SHORT = Trackway((("48.5", 0.2), ("53.1", 0.2)), trials=1, depths_m=(0.03,))
 TINY = Trackway((("48.5", 0.15),), trials=1, depths_m=(0.03,))
+OPENED = list[BenchRobot]()
 COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud after each
 
 
 def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
     segments = [(length_m, MUDS[name]) for name, length_m in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
     track = Track(segments * COPIES)
-    return simulated_bench(
+    bench = simulated_bench(
         ScriptedOperator(*answers),
         Notebook(folder, {}),
         simulated_configuration(),
@@ -45,6 +48,16 @@ def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = A
         lambda trial, prepared: prepared * track.length_m / COPIES,
         capture,
     )
+    OPENED.append(bench.robot)
+    return bench
+
+
+@pytest.fixture(autouse=True)
+def closed_robots() -> Iterator[None]:
+    """Finish the logs of a test's robots."""
+    yield
+    while OPENED:
+        OPENED.pop().close()
 
 
 def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:
