@@ -11,6 +11,7 @@ from experiments.reports.text_tables import number
 from experiments.reports.value_text import coefficient_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
+MARKS = {"ok": ("ok  ", GREEN), "warn": ("warn", YELLOW), "fail": ("FAIL", RED)}  # of a check's line, by its level
 QUIET_S = 2.0  # before progress is shown
 PACE_S = 1.0  # of work before its end can be foreseen
 REFRESH_S = 0.1

@@ -39,7 +39,7 @@ from command_line.doctor.host_facts import (
     unit_limits,
 )
 from command_line.json_output import Answer
-from command_line.screen import GREEN, RED, YELLOW, coloured
+from command_line.screen import MARKS, coloured
 from command_line.shared_options import DEFAULT_CONFIG
 from control.records import DriveStates
 from drivers.drive_types import make_drives
@@ -62,7 +62,6 @@ from operator_client.status_client import (
 )
 
 ROOT = Path("/")
-MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}
 LISTENING_S = 0.6  # six heartbeats
 START = "'systemctl start mudskipper', then 'systemctl status mudskipper'"
 UNANSWERED = {  # why the daemon does not say its status: how severe, and what to do

@@ -14,7 +14,7 @@ from command_line.json_output import Answer
 from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, Report
-from command_line.screen import GREEN, RED, YELLOW, coloured, complain
+from command_line.screen import MARKS, coloured, complain
 from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
 from control.computing.suggestion import suggestion
 from control.records import JOINTS
@@ -240,10 +240,8 @@ def check(
 
 def _check_text(item: Report, following: list[str]) -> str:
     """Format one item, and name those that follow from it."""
-    mark = coloured("warn", YELLOW) if item["warning"] else coloured("ok  ", GREEN)
-    if not item["ok"]:
-        mark = coloured("FAIL", RED)
-    lines = [f"{mark} {item['id']:24} {item['text']}"]
+    level = "fail" if not item["ok"] else "warn" if item["warning"] else "ok"
+    lines = [f"{coloured(*MARKS[level])} {item['id']:24} {item['text']}"]
     if following:
         lines.append(f"       and from the same cause: {', '.join(following)}")
     if item["fix"]:

@@ -18,6 +18,7 @@ from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate_integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
+from estimation.ground_law import MATLOCK_J, PRESSURE_AT_SURFACE
 from estimation.strokes.depth_line import SHEAR_LAW
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
@@ -290,7 +291,7 @@ def _narrowness(geometry: FlipperGeometry, depth_m: float) -> float:
     On a body of the width b the pressure at the depth z is (3 + J z/b) times the strength, at most 9 times; J = 0.5.
     """
     widths_m = geometry.plate_thickness_m, geometry.plate_width_m
-    side, face = (min(3.0 + 0.5 * depth_m / (2.0 * width_m), 9.0) for width_m in widths_m)
+    side, face = (min(PRESSURE_AT_SURFACE + MATLOCK_J * depth_m / (2.0 * width_m), 9.0) for width_m in widths_m)
     return side / face
 
 

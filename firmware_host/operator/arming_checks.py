@@ -35,7 +35,7 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
     lines["log"] = str(loop.recorder.path or "off")
     pose = loop.pose.report()
-    if pose.source:
+    if pose.source and not pose.trouble:
         lines["pose"] = pose.message
     faults = [present.fault for present in loop.aged_faults]
     if pose.trouble:  # the pose source's own text says more
@@ -51,8 +51,8 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     for identity, text in lines.items():
         own = faults_of.get(identity, [])
         items.append(_line(identity, text, own, identity in unheard) | {"cause": _cause(identity, own, cause_lines)})
-        if identity == "pose" and pose.trouble and items[-1]["ok"]:
-            items[-1] |= {"warning": True, "fix": pose.what_to_do}
+    if pose.trouble:
+        items.append(check_item("pose", True, pose.message, pose.what_to_do, warns=True))
     items += [check_item("configuration", True, each, "", warns=True) for each in loop.configuration.warnings]
     return items + [check_item("realtime", True, warning, "", warns=True) for warning in warnings]
 

@@ -170,10 +170,7 @@ class SimulatedDrive(ABC):
     def _measured_a(self) -> float:
         """Return the reported current: a forged one once, or the motor's with noise."""
         forged_a, self._forged_a = self._forged_a, nan
-        if not isnan(forged_a):
-            return forged_a
-        noise_a = self.parameters.current_noise_a
-        return self._current_a + self._random.gauss(0.0, noise_a) if noise_a else self._current_a
+        return self._current_a + self._noise(self.parameters.current_noise_a) if isnan(forged_a) else forged_a
 
     def _measured_angle(self) -> float:
         parameters, units_per_turn = self.parameters, self.units_per_turn
