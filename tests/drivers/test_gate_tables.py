@@ -114,7 +114,7 @@ def test_an_open_gate_passes_torque_within_limit_and_slew(protocol: Protocol) ->
         assert torque_that_leaves(bench, protocol, torque_nm) == pytest.approx(torque_nm, abs=0.5001 * code_nm + 1e-6)
     assert bench.gate.refused == 0
     assert torque_that_leaves(bench, protocol, 0.751 + 1.01 * code_nm) == 0.0
-    assert torque_that_leaves(bench, protocol, 0.201 + 3.0 * code_nm) == 0.0
+    assert torque_that_leaves(bench, protocol, 0.2005 + 2.0 * code_nm) == 0.0
     assert bench.gate.refused == 2
 
 
@@ -134,6 +134,15 @@ def test_after_another_command_of_its_id_torque_counts_from_zero(protocol: Proto
         bench.passed(frame)
         assert torque_that_leaves(bench, protocol, 0.4) == 0.0
         assert torque_that_leaves(bench, protocol, 0.2) == pytest.approx(0.2, abs=1e-6 + protocol.table.torque_step_nm)
+
+
+def test_after_a_question_of_its_id_torque_goes_on(protocol: Protocol) -> None:
+    for question in protocol.table.questions:
+        bench = make_bench(protocol, is_open=True)
+        for torque_nm in (0.2, 0.4):
+            torque_that_leaves(bench, protocol, torque_nm)
+        bench.passed(protocol.torque_frame(question))
+        assert torque_that_leaves(bench, protocol, 0.5) == pytest.approx(0.5, abs=1e-6 + protocol.table.torque_step_nm)
 
 
 def test_one_changed_bit_of_a_torque_command_leaves_as_zero_or_as_another_torque(protocol: Protocol) -> None:
