@@ -28,10 +28,11 @@ MISSING_ROWS = 0.3
 SEEDS = (1, 2, 3)  # of the random choice of missing rows: one draw can spare the few rows that matter
 RECORDED, LATE, EARLY, MISSING = "recorded", "current_late", "current_early", "rows_missing"
 DISTURBED = ((LATE, 0), (EARLY, 0), *((MISSING, seed) for seed in SEEDS))
-OF_STRIDE = ("flipper", "index", "t_start_s", "stance")
+HOLE_M = 0.025  # a plate's width: mud so near to its last hole is disturbed, and was 4 to 7 times weaker in a walk
+OF_STRIDE = ("flipper", "index", "t_start_s", "stance", "step_m")
 NUMBERS = ("value", "std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate
 COLUMNS = dict.fromkeys((*OF_STRIDE, "coefficient", *NUMBERS, "kind"), "object")  # kind: value, bound or invalid
-COLUMNS |= {"index": "int64", "t_start_s": "float64"} | dict.fromkeys(NUMBERS, "float64")
+COLUMNS |= {"index": "int64"} | dict.fromkeys(("t_start_s", "step_m", *NUMBERS), "float64")
 
 
 class EvaluatedLog(NamedTuple):
@@ -91,7 +92,10 @@ def _runs(name: str, recording: Recording, disturbed: bool) -> Iterator[tuple[st
 
 
 def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame:
-    """Return the estimates in the order of the strides, with the number of the walk that each belongs to."""
+    """Return the estimates in the order of the strides, with the number of the walk that each belongs to.
+
+    `re_entered`: the body had advanced by less than HOLE_M since the flipper's stride before. False without a pose.
+    """
     rows = [
         {key: getattr(stride, key) for key in OF_STRIDE}
         | {"coefficient": name, "kind": _kind_of(estimate)}
@@ -103,7 +107,9 @@ def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame
     frame = DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
     keys = [frame["flipper"], frame["coefficient"]]
     restarts = frame["index"].groupby(keys).diff() <= 0.0
-    return frame.assign(walk=restarts.groupby(keys).cumsum(), **shared)
+    frame = frame.assign(walk=restarts.groupby(keys).cumsum(), **shared)
+    advanced_m = frame.groupby(["flipper", "coefficient", "walk"])["step_m"].shift().abs()
+    return frame.assign(re_entered=advanced_m < HOLE_M)
 
 
 def _kind_of(estimate: Estimate) -> str:

@@ -64,18 +64,21 @@ def walk_scatter(coefficient: str, strides: DataFrame) -> dict[str, Any]:
     """Return how one coefficient scatters over the strides of walks in one mud, and how it changes with depth.
 
     claim: median repeatability over the value. exponent: of the depth. finding: what contradicts the depth law of mud.
+    A flipper that re-entered its hole met disturbed mud: chi compares these strides among themselves, and they do not
+    show how undisturbed mud changes with depth.
     """
     known = _with_logarithm(strides)
-    law = fit_depth_law(known)
-    deviations = scatter_about_mean(known)
+    law = fit_depth_law(known[~known["re_entered"]])
+    apart = [scatter_about_mean(each) for _, each in known.groupby("re_entered")]
+    deviations = np.concatenate([np.empty(0), *(each.deviations for each in apart)])
     found = {
         "log_sd": float(known["logarithm"].std()) if len(known) > 1 else None,
         "claim": float(known["error"].median()) if len(known) else None,
-        "chi": deviations.chi,
+        "chi": Scatter(deviations, sum(each.dof for each in apart)).chi,
         "exponent": law.exponent if law else None,
         "exponent_std_error": law.std_error if law else None,
     }
-    return _rounded(found) | {"finding": law_finding(coefficient, law)}
+    return _rounded(found) | {"re_entered": int(known["re_entered"].sum()), "finding": law_finding(coefficient, law)}
 
 
 def _rounded(found: dict[str, float | None]) -> dict[str, Any]:

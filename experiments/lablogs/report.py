@@ -51,6 +51,7 @@ HEADS = {
     "later_cv": "later CV",
     "chi_between_trials": "chi between trials",
     "chi_between_strokes": "chi between strokes",
+    "re_entered": "in a hole",
     "with_neighbour": "with a neighbour",
 }
 AGREEMENT = {"median": "median of |difference| / error", "rms": "root mean square", "n": "strides"}

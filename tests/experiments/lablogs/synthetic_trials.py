@@ -29,11 +29,12 @@ def make_stride(
     k_p: Estimate = INVALID,
     k_s: Estimate = INVALID,
     k_e: Estimate = INVALID,
+    step_m: float = UNKNOWN,
 ) -> StrideEstimate:
     """Return a stride of four seconds; both flippers begin the same stride with the same sample."""
     return StrideEstimate(
         flipper, index, 4.0 * index, 4.0 * index + 4.0, 1.0, 1.0, 1.0, k_p, k_s, k_e,
-        0.0, 0.03, True, 2.0, 8.0, -2.0, UNKNOWN,
+        0.0, 0.03, True, 2.0, 8.0, -2.0, step_m,
     )  # fmt: skip
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pandas import Series
 
-from control.records import Estimate
+from control.records import UNKNOWN, Estimate
+from experiments.lablogs.estimates import estimate_rows
 from experiments.lablogs.repeatability import (
     coefficient_of_variation,
     first_values,
@@ -15,7 +16,7 @@ from experiments.lablogs.repeatability import (
     separation,
     walk_scatter,
 )
-from tests.experiments.lablogs.synthetic_trials import INVALID, k_s_strokes, make_bound, make_value
+from tests.experiments.lablogs.synthetic_trials import INVALID, k_s_strokes, make_bound, make_stride, make_value
 
 LEVELS = (0.9, 1.0, 1.1)  # of three trials: a variation of exactly 10 %
 DECLINE = (1.0, 0.8, 0.7, 0.65, 0.6)  # of the strokes in one hole
@@ -107,3 +108,18 @@ def test_strides_of_walks_scatter_about_their_mean_and_fall_with_depth_as_they_w
     assert found["claim"] == pytest.approx(claimed)
     assert found["log_sd"] == pytest.approx(float(np.std(np.log(values), ddof=1)), abs=1e-3)
     assert found["chi"] == pytest.approx(float(np.std(np.log(values), ddof=1)) / claimed, rel=1e-2)
+
+
+def test_a_flipper_that_re_enters_its_hole_is_compared_with_others_that_do() -> None:
+    """Mud is 2, and 0.4 in a hole, whose strides are deeper; a step of less than 25 mm leads into it."""
+    made = [(2.0, 0.05), (2.1, 0.01), (0.42, 0.05), (1.9, 0.0249), (0.38, 0.0249), (0.41, 0.025), (2.2, UNKNOWN)]
+    strides = [
+        make_stride(index=index, k_p=make_value(k, 0.1 * k, 0.03 if k > 1.0 else 0.05), step_m=step_m)
+        for index, (k, step_m) in enumerate(made)
+    ]
+    rows = estimate_rows(strides)
+    known = rows[rows["coefficient"] == "k_p"]
+    assert known["re_entered"].tolist() == [k < 1.0 for k, _ in made]
+    found = walk_scatter("k_p", known)
+    assert found["re_entered"] == 3 and found["chi"] < 1.0 < walk_scatter("k_p", known.assign(re_entered=False))["chi"]
+    assert found["exponent"] is None and found["finding"] == ""
