@@ -5,11 +5,11 @@ buses (timed_walk.py): over our `mock` bus, and over SocketCAN on pairs of socke
 `--drive` chooses the type of the drives. Blocks of 1 s alternate between whole ticks, bare sockets, cold ticks, and
 ticks marked at the beginning of every stage.
 
-`ratios` hardly depend on the computer. `hot_to_bare_sockets` divides a whole tick by the time in which bare sockets
-read and send its frames; cold ticks and the longest ticks at the ends of insertions and strides are divided by a whole
-tick. All are medians. `--against FOLDER` compares with another working tree: both
-measure their whole tick over the mock bus in turns, as processes of their own. `--picture FILE` draws the medians of
-the stages; it needs matplotlib.
+`ratios` depend less on the computer than times do. `hot_to_bare_sockets` divides a whole tick by the time in which
+bare sockets read and send its frames; cold ticks and the longest ticks at the ends of insertions and strides are
+divided by a whole tick. All are medians. `--against FOLDER` compares with another working tree: both measure their
+whole tick over the mock bus in turns, as processes of their own. `--picture FILE` draws the medians of the stages; it
+needs matplotlib.
 """
 
 import json
