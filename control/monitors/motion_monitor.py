@@ -10,8 +10,7 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  never is below zero: a weight that the motor lowers at the speed of a path stays below the bound.
     oscillation  the path away from the target: |Δθ| - |Δθ*| + Δ|θ* - θ| is zero for a joint that approaches its
                  target, lags behind it or stands still, and twice the path of one that moves away. A loop that is not
-                 stable moves away twice in each of its cycles. It leaks within 0.3 s. A stone that a swinging joint
-                 hits throws it from its target a few times, also where the loop is stable: each hit halves the sum.
+                 stable moves away twice in each of its cycles. It leaks within 0.3 s.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -34,7 +33,7 @@ obeys. Oscillation and following therefore count only where samples and ticks we
 such a gap is a fault of its own (`drive_quiet`, `loop_lagging`); a simulation in real time continues.
 """
 
-from math import copysign, inf
+from math import copysign
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -45,7 +44,6 @@ RUNAWAY_LEAK_S = 0.2  # full torque that lowers a weight at 1 rad/s, the speed o
 RUNAWAY_FLOOR_J = 0.02  # noise of the speed, and a hand, where the torque limit is low
 AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
-HIT_TORQUES = 2.0  # times what full torque changes the speed by
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
@@ -84,7 +82,6 @@ class MotionMonitor:
     def __init__(self, joint: str, dynamics: JointDynamics, torque_nm: float) -> None:
         self._joint = joint
         self._half_inertia = 0.5 * dynamics.inertia_kg_m2
-        self._hit_rad_s2 = HIT_TORQUES * torque_nm / dynamics.inertia_kg_m2 if dynamics.inertia_kg_m2 else inf
         self._runaway_j = runaway_bound_j(torque_nm)
         self._near_limit_nm = NEAR_LIMIT_FRACTION * torque_nm
         stiffness_nm_rad = dynamics.stiffness_nm_rad
@@ -167,8 +164,6 @@ class MotionMonitor:
             self.away_rad = 0.0
             return
         self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
-        if abs(velocity_rad_s - before_rad_s) > self._hit_rad_s2 * elapsed_s:
-            self.away_rad *= 0.5
         error_rad = abs(target_rad - (self._angle_rad + step_rad)) - self._lag_rad
         away_rad = self.away_rad + (abs(step_rad) - abs(target_step_rad)) + error_rad  # begins again without a target
         self.away_rad = away_rad if away_rad > 0.0 else 0.0

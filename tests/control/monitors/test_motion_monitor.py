@@ -57,7 +57,6 @@ class Joint(Samples):
         super().__init__()
         self.fraction, self.delay_ticks = fraction, delay_ticks
         self.angle_rad, self.velocity_rad_s = angle_rad, velocity_rad_s
-        self.stone_rad = -inf  # throws the joint back as fast as it came
         self.commanded_nm, self.inertia_kg_m2 = [0.0], DYNAMICS.inertia_kg_m2
         self.energy_j = 0.0
 
@@ -69,8 +68,6 @@ class Joint(Samples):
         for _ in range(STEPS):
             dt_s = PERIOD_S / STEPS
             self.velocity_rad_s += dt_s * (given_nm + load_nm) / self.inertia_kg_m2
-            if self.angle_rad < self.stone_rad and self.velocity_rad_s < 0.0:
-                self.velocity_rad_s = -self.velocity_rad_s
             self.angle_rad += dt_s * self.velocity_rad_s
             self.energy_j += given_nm * dt_s * self.velocity_rad_s
         braked = target_rad is None
@@ -226,23 +223,6 @@ def test_a_slow_push_and_its_return_are_no_oscillation_and_neither_is_a_joint_th
     for tick in range(150):
         assert not late.add(min(0.02 * max(tick - 100, 0), 0.25), 0.0, min(0.0025 * tick, 0.25), PERIOD_S)
     assert late.monitor.away_rad < 0.01
-
-
-def test_a_joint_that_a_stone_throws_back_a_few_times_does_not_oscillate() -> None:
-    joint = Joint(angle_rad=0.28, velocity_rad_s=-6.0)
-    joint.stone_rad = 0.05
-    for _ in range(200):
-        joint.add(0.28, -6.0, 0.28)
-    assert joint.run(holding, 0.5, target_rad=0.0) == set()
-
-
-def test_a_joint_that_two_stops_throw_to_and_fro_oscillates() -> None:
-    samples, speed_rad_s = Samples(), 12.0
-    for tick in range(200):
-        half_cycles, phase = divmod(tick * PERIOD_S * speed_rad_s / 0.4, 1.0)
-        side = 1.0 if half_cycles % 2 else -1.0
-        samples.add(side * (0.2 - 0.4 * phase), -side * speed_rad_s, 0.0, PERIOD_S)
-    assert "joint_oscillating" in samples.names
 
 
 # following, and lateness
