@@ -8,6 +8,7 @@ chi is sqrt(chi² / degrees of freedom) of the scatter in claimed errors: 1 wher
 they are half of the true ones.
 """
 
+from collections.abc import Sequence
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -45,11 +46,10 @@ def repeatability(strokes: DataFrame) -> dict[str, Any]:
     """Return the variation and the scatter of one coefficient; None where the trials are too few."""
     first, later = first_values(strokes)["value"], later_levels(strokes)
     trials, later_strokes = scatter_between_trials(strokes), scatter_between_strokes(strokes)
-    both = Scatter(np.concatenate([trials.deviations, later_strokes.deviations]), trials.dof + later_strokes.dof)
     found = {
         "first_cv": coefficient_of_variation(first),
         "later_cv": coefficient_of_variation(later),
-        "chi": both.chi,
+        "chi": pooled([trials, later_strokes]).chi,
         "chi_between_trials": trials.chi,
         "chi_between_strokes": later_strokes.chi,
     }
@@ -69,12 +69,10 @@ def walk_scatter(coefficient: str, strides: DataFrame) -> dict[str, Any]:
     """
     known = _with_logarithm(strides)
     law = fit_depth_law(known[~known["re_entered"]])
-    apart = [scatter_about_mean(each) for _, each in known.groupby("re_entered")]
-    deviations = np.concatenate([np.empty(0), *(each.deviations for each in apart)])
     found = {
         "log_sd": float(known["logarithm"].std()) if len(known) > 1 else None,
         "claim": float(known["error"].median()) if len(known) else None,
-        "chi": Scatter(deviations, sum(each.dof for each in apart)).chi,
+        "chi": pooled([scatter_about_mean(each) for _, each in known.groupby("re_entered")]).chi,
         "exponent": law.exponent if law else None,
         "exponent_std_error": law.std_error if law else None,
     }
@@ -83,6 +81,12 @@ def walk_scatter(coefficient: str, strides: DataFrame) -> dict[str, Any]:
 
 def _rounded(found: dict[str, float | None]) -> dict[str, Any]:
     return {name: None if value is None else round(value, 4) for name, value in found.items()}
+
+
+def pooled(parts: Sequence[Scatter]) -> Scatter:
+    """Return the scatter of all parts, each about means of its own."""
+    deviations = [each.deviations for each in (Scatter(), *parts)]  # of no part too
+    return Scatter(np.concatenate(deviations), sum(each.dof for each in parts))
 
 
 def scatter_about_mean(known: DataFrame) -> Scatter:
