@@ -10,7 +10,9 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  never is below zero: a weight that the motor lowers at the speed of a path stays below the bound.
     oscillation  the path away from the target: |Δθ| - |Δθ*| + Δ|θ* - θ| is zero for a joint that approaches its
                  target, lags behind it or stands still, and twice the path of one that moves away. A loop that is not
-                 stable moves away twice in each of its cycles. It leaks within 0.3 s.
+                 stable moves away twice in each of its cycles. It leaks within 0.3 s. A joint that shoots past its
+                 target, out of the mud or thrown by a stone, and comes to rest, moves as far in a few cycles. Each of
+                 its excursions is clearly smaller than the one before on the other side, and does not count.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -44,6 +46,7 @@ RUNAWAY_LEAK_S = 0.2  # full torque that lowers a weight at 1 rad/s, the speed o
 RUNAWAY_FLOOR_J = 0.02  # noise of the speed, and a hand, where the torque limit is low
 AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
+STABLE_FRACTION = 0.85  # of the excursion before, which fades: a loop with 0.09 of critical damping keeps 0.75 in 40 ms
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
@@ -91,7 +94,8 @@ class MotionMonitor:
     def reset(self) -> None:
         self.unexplained_j = self.away_rad = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
-        self._target_rad = self._lag_rad = UNKNOWN
+        self._target_rad = self._error_rad = UNKNOWN
+        self._excursion_rad = self._excursion_before_rad = 0.0  # largest errors since the target was passed, and before
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
         self.driven_back = 0  # intervals in a row
@@ -132,8 +136,8 @@ class MotionMonitor:
             self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, braked)
         self._impulse_nm_s = self._elapsed_s = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
-        self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
-        following = not self._lag_rad > self._following_rad  # also without a target
+        self._target_rad, self._error_rad = target_rad, target_rad - angle_rad
+        following = not abs(self._error_rad) > self._following_rad  # also without a target
         explained = self.unexplained_j <= self._runaway_j and self.driven_back < NOT_YIELDED
         if not following or not explained or self.away_rad > AWAY_RAD:
             self._report(found, target)
@@ -161,12 +165,22 @@ class MotionMonitor:
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
         if self._punctual_s < SETTLING_S:
-            self.away_rad = 0.0
+            self.away_rad = self._excursion_rad = self._excursion_before_rad = 0.0
             return
-        self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
-        error_rad = abs(target_rad - (self._angle_rad + step_rad)) - self._lag_rad
-        away_rad = self.away_rad + (abs(step_rad) - abs(target_step_rad)) + error_rad  # begins again without a target
+        self._watch_error(1.0 - elapsed_s / AWAY_LEAK_S, step_rad, target_rad, target_step_rad)
+
+    def _watch_error(self, kept: float, step_rad: float, target_rad: float, target_step_rad: float) -> None:
+        """Add to the path away, of which a part is kept, and to the present excursion. Without a target it is zero."""
+        error_rad = target_rad - (self._angle_rad + step_rad)
+        lag_rad = abs(error_rad)
+        turned_rad = abs(step_rad) - abs(target_step_rad) + lag_rad - abs(self._error_rad)
+        away_rad = kept * self.away_rad + turned_rad
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
+        self._excursion_before_rad *= kept
+        if error_rad * self._error_rad < 0.0:
+            self._excursion_before_rad, self._excursion_rad = self._excursion_rad, 0.0
+        if lag_rad > self._excursion_rad:
+            self._excursion_rad = lag_rad
 
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
@@ -209,7 +223,7 @@ class MotionMonitor:
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
         if self.driven_back >= NOT_YIELDED:
             found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
-        if self.away_rad > AWAY_RAD:
+        if self.away_rad > AWAY_RAD and self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:
             return

@@ -216,6 +216,25 @@ def test_a_joint_that_swings_about_its_held_pose_is_found_by_its_path() -> None:
     assert float(dict(samples.faults[0].values)["away_rad"]) > AWAY_RAD
 
 
+@pytest.mark.parametrize(("kept", "expected"), [(0.65, set()), (0.95, {"joint_oscillating"})])
+def test_swings_about_the_target_that_decay_fast_are_no_oscillation(kept: float, expected: set[str]) -> None:
+    samples, farthest_rad = Samples(), 0.0
+    for tick in range(100):
+        half_cycles = 2.0 * 20.0 * tick * PERIOD_S
+        samples.add(0.3 * kept**half_cycles * sin(pi * half_cycles), 0.0, 0.0, PERIOD_S)
+        farthest_rad = max(farthest_rad, samples.monitor.away_rad)
+    assert farthest_rad > AWAY_RAD
+    assert samples.names == expected
+
+
+def test_an_excursion_hides_smaller_ones_on_the_other_side_only_until_it_has_faded() -> None:
+    samples = Samples()
+    for angle_rad in (0.0, 0.24):
+        assert not samples.add(angle_rad, 0.0, 0.0, PERIOD_S)
+    times = [tick for tick in range(150) if samples.add(-0.06 + 0.05 * sin(0.4 * tick), 0.0, 0.0, PERIOD_S)]
+    assert 0.1 < times[0] * PERIOD_S < 0.3
+
+
 def test_a_slow_push_and_its_return_are_no_oscillation_and_neither_is_a_joint_that_catches_up() -> None:
     pushed, late = Samples(), Samples()
     for tick in range(760):
