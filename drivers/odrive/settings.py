@@ -61,8 +61,11 @@ class DriveSettings:
             self._watchdog_timeout_s = timeout_s
 
     def due_requests(self, node_id: int, now_s: float) -> Iterator[Frame]:
-        """Yield the frames that ask for settings: unknown ones every REPEAT_UNKNOWN_S, all others every REFRESH_S."""
-        if self._is_due("version", self.version is not None, now_s):
+        """Yield the frames that ask for settings: unknown ones every REPEAT_UNKNOWN_S, all others every REFRESH_S.
+
+        A version that is not supported is asked for as an unknown one: it may have been a garbled frame.
+        """
+        if self._is_due("version", self.supported, now_s):
             yield Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True)
         endpoints = self.watchdog_endpoints
         if self._is_due("watchdog", isfinite(self.watchdog_s), now_s) and endpoints is not None:

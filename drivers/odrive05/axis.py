@@ -52,6 +52,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._turns, self._counted_s = 0.0, NEVER_S  # by the newest counts
         self._idle_data = b""  # of the current
         self._measured_data = b""  # of the newest current
+        self._version_answered = False
         self._proof.reset()
         super().reset()
         self._forget_counts()
@@ -84,6 +85,10 @@ class Odrive05Axis(CanSimpleAxis):
         self._receive_state(state, False, now_s)
         fit = state == AxisState.IDLE and not self._error_flags and not self._following
         self._proof.on_heartbeat(expired, fit, self._read_s, self._read_before_s)
+
+    def _receive_version(self, data: bytes, now_s: float) -> None:
+        self._version_answered = True
+        super()._receive_version(data, now_s)
 
     def _receive_part(self, part: int, message: Message, data: bytes) -> None:
         (flags,) = message.decode(data)
@@ -214,10 +219,15 @@ class Odrive05Axis(CanSimpleAxis):
     def request_settings(self, now_s: float) -> None:
         """Ask for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has.
 
-        What else a drive of a known version is asked for would set a new node id in firmware 0.5.
+        What else a drive of a known version is asked for would set a new node id in firmware 0.5. A version that is
+        not repeated when it is asked for again was a garbled frame.
         """
         if self._proof.silent:
             return
         if self._version_request in self.settings.due_requests(self.parameters.node_id, now_s):
+            if self.settings.version and not self._version_answered:
+                self.settings.forget()
+                self._health = None
+            self._version_answered = False
             self._outlet.send(self._version_request)
             self._outlet.send(self._counts_request)

@@ -346,4 +346,48 @@ REGRESSIONS = (
             for_s=1.037,
         ),
     ),
+    Regression(
+        "a joint that shot out of stiff mud past its target and came to rest counted as oscillating",
+        Scenario(
+            seed=9630082,
+            surroundings=Surroundings(
+                seed=601880,
+                strength_pa=3273,
+                stone_m=0.063,
+                drives=(("message_delay_s", 0.0005),),
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.0),
+                    ("gait.swing_duration_s", 0.4),
+                    ("gait.insertion_speed_m_s", 0.2),
+                    ("gains.sweep_stiffness_nm_rad", 6.8),
+                    ("gains.adduction_stiffness_nm_rad", 10.8),
+                ),
+            ),
+            start="stance",
+            events=(),
+            for_s=0.8,
+        ),
+    ),
+    Regression(
+        "so did a joint that a stone threw back and forth until it came to rest",
+        Scenario(
+            seed=9101688,
+            surroundings=Surroundings(
+                seed=568855,
+                strength_pa=3633,
+                depth_m=0.021,
+                stone_m=0.039,
+                drive_type="odrive05",
+                drives=(("message_delay_s", 0.0005),),
+                configuration=(
+                    ("motion.path_speed_rad_s", 1.5),
+                    ("motion.fade_in_s", 0.1),
+                    ("gait.swing_duration_s", 0.4),
+                ),
+            ),
+            start="extraction",
+            events=(Call(at_s=0.0, client="pilot", method="stop"),),
+            for_s=0.8,
+        ),
+    ),
 )

@@ -320,6 +320,19 @@ def test_a_drive_with_a_version_has_another_firmware(bench: Bench) -> None:
     assert bench.drives.refused_commands == 0
 
 
+@pytest.mark.parametrize(
+    ("version", "longest_s"), [((2, 4, 4, 58, 193, 6, 11, 0), 1.5), ((2, 4, 4, 58, 0, 6, 11, 0), 4.5)]
+)
+def test_a_version_counts_until_it_is_not_repeated(bench: Bench, version: tuple[int, ...], longest_s: float) -> None:
+    bench.run(poll=True)
+    for _ in range(5):
+        bench.report(codec.GET_VERSION, *version)
+        while VERSION not in bench.tick(poll=True):
+            assert not bench.health.firmware_supported
+    bench.run(longest_s, poll=True)
+    assert (bench.health.firmware, bench.health.firmware_supported) == ("0.5", True)
+
+
 def test_counts_that_do_not_fit_the_position_name_the_key(bench: Bench) -> None:
     bench.run()
     bench.estimates, bench.counts = (1.5, 0.0), round(1.5 * 8192)
