@@ -192,7 +192,8 @@ class LeaseHeld(Promise):
 class SilentLoop(Promise):
     """No motor drives its joint any longer than its watchdog lasts once no command can reach it, as with SIGSTOP.
 
-    A drive may brake on: a moteus whose watchdog has expired damps.
+    A drive may brake on: a moteus whose watchdog has expired damps. One that others armed is commanded zero, which its
+    protocol may round to half a code.
     """
 
     LONGEST_S = WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
@@ -201,8 +202,10 @@ class SilentLoop(Promise):
         robot = self.mechanics
         if robot.now_s - self.robot.heard_s < self.LONGEST_S:
             return
-        velocities_rad_s, least_nm = robot.plant.velocities_rad_s, self.reach.cogging_nm + ROUNDING_NM
+        velocities_rad_s = robot.plant.velocities_rad_s
         for index, torque_nm in enumerate(torques_nm):
+            rounded_nm = self.reach.half_codes_nm[index] if self.reach.is_energised_by_others(index) else 0.0
+            least_nm = self.reach.cogging_nm + ROUNDING_NM + rounded_nm
             drives = abs(torque_nm) > least_nm and torque_nm * velocities_rad_s[index] > 0.0
             if drives and not self.reach.is_foreign(index):
                 self.broken.append(f"{JOINTS[index]} is driven with {torque_nm:.3f} N·m although the loop is silent")
