@@ -363,6 +363,40 @@ def test_a_joint_that_a_recovery_rocks_in_mud_that_creeps_unevenly_against_it_is
     assert rock(0.05, 1.0, uneven_rad=0.0012)[0] == set()
 
 
+Rocked = tuple[float, float, int]  # torque, speed, samples of 1/512 s
+
+
+def rocked(*parts: Rocked) -> int:
+    """Return the intervals in a row in which a joint without a target was driven back."""
+    samples, angle_rad = Samples(), 0.0
+    for torque_nm, velocity_rad_s, count in ((0.25, 0.0, 8), *parts, (-0.75, 0.0, 1)):
+        for _ in range(count):
+            angle_rad += velocity_rad_s / 512.0
+            samples.add(angle_rad, velocity_rad_s, None, 1.0 / 512.0, torque_nm)
+    return samples.monitor.driven_back
+
+
+PRESS, PAUSE = (-0.75, 0.0625, 24), (0.1875, 0.0625, 24)
+
+
+@pytest.mark.parametrize(
+    ("parts", "driven_back"),
+    [
+        ([PRESS, PAUSE], 1),
+        ([PRESS, (0.25, 0.0625, 24)], 0),  # a mean of exactly PRESSING_NM
+        ([(-0.75, 0.03125, 24), (0.1875, 0.015625, 24)], 0),  # 2.2 mrad, where 2.8 count
+        ([PRESS, (0.1875, 0.0625, 24), (0.25, 4.0, 1), (-0.75, 4.0, 1)], 0),  # the joint is fast as the torque turns
+        ([PRESS, PAUSE, PRESS, PAUSE, PRESS, PAUSE], 3),
+        ([PRESS, PAUSE, (-0.75, 0.125, 24), PAUSE], 0),  # 8.8 mrad after 5.9, where 1.3 more may be
+        ([PRESS, PAUSE, (-0.75, 0.0791015625, 24), PAUSE], 2),
+    ],
+)
+def test_a_rocking_counts_where_its_mean_torque_presses_and_its_path_is_as_in_the_one_before(
+    parts: list[Rocked], driven_back: int
+) -> None:
+    assert rocked(*parts) == driven_back
+
+
 def lowered(now_s: float, angle_rad: float) -> float:
     """The load of a weight that a hand lowers."""
     return -0.6 * min(now_s / 2.0, 1.0)
