@@ -17,7 +17,7 @@ from math import fsum, hypot, isfinite, sqrt
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame
+from pandas import DataFrame, Series
 
 from control.faults import FAULT_KINDS, Reaction
 from control.records import COEFFICIENTS, UNKNOWN
@@ -90,6 +90,7 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
     estimates = run.estimates[run.estimates["mud"] == mud]
     by_flipper = {flipper: estimates[estimates["flipper"] == flipper] for flipper in run.replay.flippers}
     values = estimates[estimates["valid"] & ~estimates["at_least"]]
+    fresh = values.merge(run.strides.loc[~_re_entered(run), ["walk", "index"]])
     law = _ground_law(run, estimates)
     return {
         "mud": mud,
@@ -100,9 +101,18 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
         "deepest_m": max(depths_m),
         "both": _gathered(estimates),
         "law": law_report(law),
-        "findings": [*_depth_findings(values), *ground_finding(law, len(strides))],
+        "findings": [*_depth_findings(fresh), *ground_finding(law, len(strides))],
         "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
     }
+
+
+def _re_entered(run: Run) -> Series:
+    """Return which strides began in the hole of the one before: the body had advanced by less than a plate's width.
+
+    Mud is weaker there, whatever the depth. Without a pose it is not known.
+    """
+    advanced_m = run.strides.groupby("walk")["step_m"].shift().abs()
+    return advanced_m < max((walk.geometry.plate.width_m for walk in run.walks), default=0.0)
 
 
 def speed_of(strides: DataFrame) -> Entry:
@@ -143,9 +153,9 @@ def ground_finding(law: LawEvidence | None, strides: int) -> list[str]:
     return [f"{finding} how k_p, k_s and k_e compare: each is predicted wrong from the other two, as {wrong}."]
 
 
-def _depth_findings(values: DataFrame) -> list[str]:
+def _depth_findings(fresh: DataFrame) -> list[str]:
     """Return what contradicts the depth law of mud; strides without a repeatability, as of older logs, do not."""
-    findings = [law_finding(name, fit_depth_law(values[values["coefficient"] == name])) for name in COEFFICIENTS]
+    findings = [law_finding(name, fit_depth_law(fresh[fresh["coefficient"] == name])) for name in COEFFICIENTS]
     return [finding for finding in findings if finding]
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import hypot, sqrt
 from pathlib import Path
 from statistics import fmean
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from pandas import DataFrame
 
 from control.faults import Reaction
+from control.geometry import FlipperGeometry
 from control.modes import Mode
 from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
@@ -191,3 +193,20 @@ def test_a_ground_that_does_not_keep_the_law_of_mud_is_a_finding() -> None:
     assert ground_finding(None, 9) == ground_finding(LawEvidence("mud", errors), 9) == []
     for name in ("sand", UNDECIDED):
         assert [len(ground_finding(LawEvidence(name, errors), strides)) for strides in (1, 2)] == [0, 1]
+
+
+@pytest.mark.parametrize(("step_m", "findings"), [(0.03, 1), (0.01, 0)])
+def test_strides_in_their_last_hole_do_not_contradict_the_depth_law_of_mud(step_m: float, findings: int) -> None:
+    """Deep strides are weak here. After steps of less than the plate's width (25 mm) each is in a hole."""
+    depths_m = [0.03, 0.031, 0.05, 0.052, 0.029, 0.03, 0.051, 0.05]
+    made = []
+    for index, depth_m in enumerate(depths_m):
+        is_deep, is_next_deep = depth_m > 0.04, depths_m[(index + 1) % len(depths_m)] > 0.04
+        value = 0.4e6 if is_deep else 3e6
+        own, estimates = stride("A", value, value, step_m if is_next_deep else 0.06)
+        known = {"index": index, "depth_m": depth_m, "repeatability": 0.05e6}
+        made.append((own | {"index": index}, [each | known for each in estimates]))
+    run = run_of(made)
+    walk: Any = SimpleNamespace(geometry=FlipperGeometry(), body_x_m=np.array([]), time_s=np.array([]))
+    (mud,) = headline_of(replace(run, walks=[walk]))["muds"]
+    assert len([text for text in mud["findings"] if text.startswith("k_p")]) == findings
