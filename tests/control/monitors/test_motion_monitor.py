@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import copysign, inf, nan, nextafter, pi, sin
+from typing import NamedTuple
 
 import pytest
 
@@ -363,36 +364,43 @@ def test_a_joint_that_a_recovery_rocks_in_mud_that_creeps_unevenly_against_it_is
     assert rock(0.05, 1.0, uneven_rad=0.0012)[0] == set()
 
 
-Rocked = tuple[float, float, int]  # torque, speed, samples of 1/512 s
+class Rock(NamedTuple):
+    """A part of a recovery's rocking."""
+
+    torque_nm: float
+    velocity_rad_s: float
+    samples: int = 24  # of 1/512 s
+    target_rad: float | None = None
 
 
-def rocked(*parts: Rocked) -> int:
-    """Return the intervals in a row in which a joint without a target was driven back."""
+def rocked(*parts: Rock) -> int:
+    """Return the intervals in a row in which a rocked joint was driven back."""
     samples, angle_rad = Samples(), 0.0
-    for torque_nm, velocity_rad_s, count in ((0.25, 0.0, 8), *parts, (-0.75, 0.0, 1)):
-        for _ in range(count):
-            angle_rad += velocity_rad_s / 512.0
-            samples.add(angle_rad, velocity_rad_s, None, 1.0 / 512.0, torque_nm)
+    for part in (Rock(0.25, 0.0, 8), *parts, Rock(-0.75, 0.0, 1)):
+        for _ in range(part.samples):
+            angle_rad += part.velocity_rad_s / 512.0
+            samples.add(angle_rad, part.velocity_rad_s, part.target_rad, 1.0 / 512.0, part.torque_nm)
     return samples.monitor.driven_back
 
 
-PRESS, PAUSE = (-0.75, 0.0625, 24), (0.1875, 0.0625, 24)
+PRESS, PAUSE = Rock(-0.75, 0.0625), Rock(0.1875, 0.0625)
 
 
 @pytest.mark.parametrize(
     ("parts", "driven_back"),
     [
         ([PRESS, PAUSE], 1),
-        ([PRESS, (0.25, 0.0625, 24)], 0),  # a mean of exactly PRESSING_NM
-        ([(-0.75, 0.03125, 24), (0.1875, 0.015625, 24)], 0),  # 2.2 mrad, where 2.8 count
-        ([PRESS, (0.1875, 0.0625, 24), (0.25, 4.0, 1), (-0.75, 4.0, 1)], 0),  # the joint is fast as the torque turns
+        ([PRESS, Rock(0.25, 0.0625)], 0),  # a mean of exactly PRESSING_NM
+        ([Rock(-0.75, 0.03125), Rock(0.1875, 0.015625)], 0),  # 2.2 mrad, where 2.8 count
+        ([PRESS, PAUSE, Rock(0.25, 4.0, 1), Rock(-0.75, 4.0, 1)], 0),  # the joint is fast as the torque turns
+        ([PRESS, Rock(-0.75, 0.0625, 1, 0.0), PAUSE], 0),  # a target in between
         ([PRESS, PAUSE, PRESS, PAUSE, PRESS, PAUSE], 3),
-        ([PRESS, PAUSE, (-0.75, 0.125, 24), PAUSE], 0),  # 8.8 mrad after 5.9, where 1.3 more may be
-        ([PRESS, PAUSE, (-0.75, 0.0791015625, 24), PAUSE], 2),
+        ([PRESS, PAUSE, Rock(-0.75, 0.125), PAUSE], 0),  # 8.8 mrad after 5.9, where 1.3 more may be
+        ([PRESS, PAUSE, Rock(-0.75, 0.0791015625), PAUSE], 2),
     ],
 )
 def test_a_rocking_counts_where_its_mean_torque_presses_and_its_path_is_as_in_the_one_before(
-    parts: list[Rocked], driven_back: int
+    parts: list[Rock], driven_back: int
 ) -> None:
     assert rocked(*parts) == driven_back
 
@@ -426,13 +434,21 @@ def test_a_joint_that_yields_to_a_load_when_it_is_probed_is_healthy(
     assert 1 <= probes <= 5
 
 
-@pytest.mark.parametrize("rates_rad_s", [(0.1, 0.1), (-0.5, -0.5), (-0.3, -0.1), (-0.3, -0.5)])
+@pytest.mark.parametrize("rates_rad_s", [(0.1, 0.1), (-0.5, -0.5), (-0.3, -0.1), (-0.3, -0.4), (-0.3, -0.5)])
 def test_a_joint_whose_speed_changes_in_its_probe_or_after_it_is_healthy(rates_rad_s: tuple[float, float]) -> None:
     joint = PushedJoint()
     joint.push(0.7, -0.3, 1 + 3 * 31)
     assert joint.monitor.probed
     assert [joint.push(0.5, rate_rad_s, 26) for rate_rad_s in rates_rad_s] == [None, None]
     assert joint.monitor.driven_back < 3
+
+
+def test_the_probe_of_a_joint_that_hardly_presses_counts_too() -> None:
+    joint = PushedJoint()
+    joint.push(0.3, -0.3, 1 + 3 * 31)
+    assert joint.monitor.probed
+    joint.push(0.3 - PROBE_NM, -0.3, 26)
+    assert joint.monitor.driven_back == 4
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -445,7 +461,8 @@ def test_a_target_that_moves_with_the_joint_does_not_explain_a_path_against_full
     for tick in range(round(0.5 / PERIOD_S)):
         angle_rad = sign * 0.3 * tick * PERIOD_S
         target_rad = angle_rad - sign * 0.1 if follows else None
-        samples.add(angle_rad, sign * 0.3, target_rad, PERIOD_S, sign * torque_nm * TORQUE_NM, sign * 0.3)
+        against_nm = torque_nm * TORQUE_NM + (PROBE_NM if samples.monitor.probed else 0.0)
+        samples.add(angle_rad, sign * 0.3, target_rad, PERIOD_S, sign * against_nm, sign * 0.3)
     assert samples.names == (set() if leads and follows else {"joint_driven_back"})
 
 
