@@ -82,8 +82,9 @@ def open_power_switch(parameters: EmergencyStopParameters) -> PowerSwitch | None
                 return None
     except ImportError as problem:
         raise PowerSwitchError(f"emergency_stop.source = {parameters.source!r}: {problem}; {INSTALL}") from problem
-    except OSError as problem:
-        raise PowerSwitchError(f"emergency_stop: {name} does not open: {problem.strerror or problem}") from problem
+    except (OSError, ValueError, NotImplementedError) as problem:  # gpiod raises the latter for EINVAL, EOPNOTSUPP
+        reason = getattr(problem, "strerror", None) or problem.args[-1]
+        raise PowerSwitchError(f"emergency_stop: {name} does not open: {reason}") from problem
     return PowerSwitch(lambda: read() is cut, name)
 
 

@@ -108,22 +108,30 @@ def test_a_pressed_key_is_a_cut(monkeypatch: pytest.MonkeyPatch, key: str, cut: 
         ("key", "KEY_A", None, "mudskipper[inputs]"),
         ("key", "KEY_NONE", Evdev(), "KEY_NONE"),
         ("key", "KEY_B", Evdev(), "no such key"),
-        ("gpio", "", SimpleNamespace(), "does not open"),
+        ("gpio", "", FileNotFoundError(2, "No such file"), "does not open: No such file"),
+        ("gpio", "", ValueError(22, "Invalid argument"), "does not open: Invalid argument"),  # by gpiod: no such line
+        ("gpio", "", NotImplementedError(95, "not supported"), "does not open: not supported"),  # no pull-up
     ],
 )
 def test_an_input_that_does_not_open_is_one_sentence(
     monkeypatch: pytest.MonkeyPatch, source: Any, key: str, module: Any, message: str
 ) -> None:
-    if source == "gpio" and module:
+    modules = {"gpiod": module, "evdev": module}
+    if isinstance(module, Exception):
         modules = gpio("", [])
-        modules["gpiod"].request_lines = lambda *_, **__: (_ for _ in ()).throw(FileNotFoundError(2, "No such file"))
-    else:
-        modules = {"gpiod": module, "evdev": module}
+        modules["gpiod"].request_lines = lambda *_, **__: (_ for _ in ()).throw(module)
     for name, each in modules.items():
         monkeypatch.setitem(sys.modules, name, each)
     with pytest.raises(PowerSwitchError) as problem:
         open_power_switch(EmergencyStopParameters(source, "/dev/x", 17, key))
     assert message in str(problem.value) and "\n" not in str(problem.value)
+
+
+@pytest.mark.parametrize(("source", "library"), [("gpio", "gpiod"), ("key", "evdev")])
+def test_the_real_libraries_are_called_as_they_want_to_be(source: Any, library: str) -> None:
+    pytest.importorskip(library)
+    with pytest.raises(PowerSwitchError, match="/dev/null does not open: .*(No such device|Inappropriate ioctl)"):
+        open_power_switch(EmergencyStopParameters(source, "/dev/null", 17, "KEY_ESC"))
 
 
 @pytest.mark.parametrize("source", ["", "drives"])
