@@ -65,13 +65,15 @@ class OdriveAxis(CanSimpleAxis):
     def _build_health(self) -> DriveHealth:
         flags, settings = self._error_flags | self.disarm_reason, self.settings
         common = super()._build_health()
+        firmware = ".".join(map(str, settings.version)) if settings.version else ""
+        build = f"firmware {firmware}, hardware {settings.hardware}"
         return common._replace(
-            firmware=".".join(map(str, settings.version)) if settings.version else "",
+            firmware=firmware,
             supported_firmware=".".join(map(str, SUPPORTED)),
             firmware_supported=settings.supported,
             hardware=settings.hardware,
             watchdog_s=settings.watchdog_s,
-            watchdog_advice=f"name the parameter numbers of firmware {settings.hardware} in [[watchdog_endpoints]]",
+            watchdog_advice=f"name the parameter numbers of {build} in [[watchdog_endpoints]]",
             power_cut=bool(self._error_flags & codec.POWER_CUT),
             watchdog_expired=bool(flags & codec.ERROR_WATCHDOG),
             serial_number=settings.serial_number,

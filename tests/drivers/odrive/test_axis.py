@@ -221,6 +221,8 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench.read(0.1)
     assert bench.request_watchdogs(1.0) == []
     assert isnan(bench.axis.settings.watchdog_s)
+    hardware, firmware = (".".join(map(str, version[part])) for part in (slice(1, 4), slice(4, 7)))
+    assert f"of firmware {firmware}, hardware {hardware} in" in bench.drives.health[0].watchdog_advice
     assert bench.drives.malformed_frames == 0
 
 
