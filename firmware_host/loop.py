@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from control.controller import RESTING, Controller, WalkOrder
 from control.depth.gait_choice import quickest
-from control.fault_causes import AgedFault
+from control.fault_causes import AgedFault, group_by_cause
 from control.fault_latch import FaultLatch
 from control.faults import OVERRULED_BY_FORCE, Fault, Reaction
 from control.gait.recovery import Recovery
@@ -315,9 +315,16 @@ class Loop:
         for depth_m in () if order is None else order.depths_m or (order.depth_m,):
             if not 0.0 < depth_m <= deepest_m:
                 return f"depth {100.0 * depth_m:g} cm: out of the flippers' reach over the sweep"
-        health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
+        health = self.health._replace(blocking=self._blocking_causes(forced))
         refused = refusal(self.mode, request, health)
         return refused.text if refused else None
+
+    def _blocking_causes(self, forced: str) -> tuple[Fault, ...]:
+        """Return the faults that prevent arming, without those that follow from another of them."""
+        blocking = self.faults.blocking(forced)
+        aged = [each for each in self.aged_faults if each.fault in blocking]
+        causes = group_by_cause(aged, self.configuration.bus_of)
+        return tuple(each.fault for cause in causes for each in cause.faults)
 
 
 def _make_controller(configuration: Configuration) -> Controller:

@@ -146,23 +146,22 @@ def clear(
 ) -> Answer:
     with StatusClient(socket) as client:
         client.call("clear", **({"zero": True} if zero else {}))
-        report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
-    messages = [fault["message"] for fault in stopping_faults(report)]
-    if messages or not _is_at_rest(report):
-        raise _refusal(
-            f"the cause is still there: {' '.join(messages) or report['mode']}{_reset_advice(Path(socket), report)}"
-        )
+        report = _poll(client, lambda status: _is_at_rest(status) and not _stopping_causes(status), CLEARING_S)
+    if causes := _stopping_causes(report):
+        texts = [f"{cause['message']} {_advice(cause, Path(socket))}." for cause in causes]
+        raise _refusal(f"the cause is still there: {' '.join(texts)}")
+    if not _is_at_rest(report):
+        raise _refusal(f"the robot is {report['mode']}: 'mudskipper status' says why")
     return mode_answer("clear", report["mode"])
 
 
-def _reset_advice(socket: Path, report: Report) -> str:
-    """Return how a joint beyond its range is moved back: by hand, or by the simulation that this socket belongs to."""
-    if all(fault["name"] != BEYOND_RANGE for fault in stopping_faults(report)):
-        return ""
-    if socket.parent.parent != find_run_folder():
-        return " Move it back by hand, then 'mudskipper clear'"
+def _advice(cause: Report, socket: Path) -> str:
+    """Return what to do about a cause; the simulation that this socket belongs to moves a joint back."""
+    advice: str = cause["what_to_do"]
+    if cause["name"] != BEYOND_RANGE or socket.parent.parent != find_run_folder():
+        return f"{advice[0].upper()}{advice[1:]}"
     named = "" if socket.parent.name == SIMULATED else f" --bus {socket.parent.name}"
-    return f" 'mudskipper simulate --reset{named}' moves it back, then 'mudskipper clear'"
+    return f"'mudskipper simulate --reset{named}' moves it back, then 'mudskipper clear'"
 
 
 def _is_at_rest(report: Report) -> bool:
@@ -173,9 +172,9 @@ def _refusal(message: str) -> CommandError:
     return CommandError(message, status=exit_codes.REFUSED)
 
 
-def stopping_faults(report: Report) -> list[Report]:
-    """Return the active faults that are more than a warning."""
-    return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
+def _stopping_causes(report: Report) -> list[Report]:
+    """Return the causes of faults that are more than a warning."""
+    return [cause for cause in report["causes"] if cause["reaction"] not in MILD]
 
 
 def _change_mode(command: str, mode: str, socket: Socket, params: dict[str, Any], waiting_s: float = 0.0) -> Answer:

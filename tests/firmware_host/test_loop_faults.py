@@ -163,6 +163,9 @@ def test_all_drives_that_fall_silent_at_once_have_no_power(at: Copied, stage: st
     causes = group_by_cause(robot.loop.aged_faults, robot.loop.configuration.bus_of)
     assert [cause.root.name for cause in causes] == ["power_cut"]
     assert robot.loop.events.notice.startswith("stopped by power_cut: ") or stage == "idle"
+    if mode_of(robot) is Mode.IDLE:
+        refused = robot.loop.request(Request.ARM, robot.now_s) or ""
+        assert refused.startswith("The motors' power was cut") and "No message" not in refused  # the cause alone
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     robot.run_for(0.6)
     assert "power_cut" in {fault.name for fault in robot.loop.faults.present}  # the cause is still there

@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.operation import confirmation
+from command_line.operation import confirmation, operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN, send_order, unconfirmed_drives
 from control.records import JOINTS
 from operator_client.status_client import CallRefusedError, DroppedError, NotPermittedError
+from simulation.harness.local_setup import named_folder
 from tests.command_line.command_lines import run
 from tests.command_line.fake_client import answer_with, next_of
 
@@ -127,6 +128,36 @@ def test_a_closed_connection_is_not_reported_as_a_missing_daemon(command: str, m
     ended = run(command)
     assert (ended.returncode, ended.stdout) == (exit_codes.NO_DAEMON, "")
     assert ended.stderr == "mudskipper: the daemon closed the connection\n"
+
+
+# clear
+
+BACK = "moves it back, then 'mudskipper clear'"
+
+def cause(name: str, what_to_do: str) -> Report:
+    return {"name": name, "message": f"It is {name}.", "what_to_do": what_to_do, "reaction": "damping"}
+
+
+@pytest.mark.parametrize(
+    ("name", "bus", "advice"),
+    [
+        ("power_cut", "robot", "Release the switch."),
+        ("joint_position", "", "Move it back."),  # of no simulated robot
+        ("joint_position", "robot", f"'mudskipper simulate --reset' {BACK}."),
+        ("joint_position", "other", f"'mudskipper simulate --reset --bus other' {BACK}."),
+    ],
+)
+def test_a_refused_clear_names_the_cause_and_what_ends_it(
+    name: str, bus: str, advice: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(operation, "CLEARING_S", 0.0)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    socket = named_folder(bus) / "mudskipper.sock" if bus else tmp_path / "robot" / "mudskipper.sock"
+    todo = {"power_cut": "release the switch", "joint_position": "move it back"}[name]
+    answer_with(monkeypatch, next_of(report("fault", False) | {"causes": [cause(name, todo)]}))
+    ended = run("clear", "--socket", str(socket))
+    assert ended.returncode == exit_codes.REFUSED
+    assert ended.stderr == f"mudskipper: the cause is still there: It is {name}. {advice}\n"
 
 
 # arm --wait
