@@ -20,7 +20,9 @@ from experiments.studies.actuator import INSTALLED, Lever, LeverTolerance, Passe
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
-from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import load_configuration, parse_configuration
+from simulation.harness.local_setup import with_simulated_watchdogs
 
 HAS_ROBOT = False  # no daemon's, at its socket
 WEIGHTS_G, TRIALS = (100.0, 200.0, 400.0), 2  # within the default limits.torque_nm at 12 cm
@@ -44,8 +46,7 @@ def study(
 ) -> Result:
     """Signs, zeros, ranges, velocity, torque and friction of every joint, with hands and weights."""
     session = session._replace(simulated=session.simulated or practise)
-    is_bench = session.simulated and not config
-    configuration = bench_configuration() if is_bench else load_configuration(config or INSTALLED)
+    configuration = _simulated(config) if session.simulated else load_configuration(config or INSTALLED)
     target = find_target(config or INSTALLED, configuration.text, session)
     joints = joint or configuration.rig.joints
     plan = WeighingPlan(
@@ -62,3 +63,9 @@ def study(
     robot = CalibratedRobot(session, built, seed, practise)
     result = calibrate_robot(robot, configuration, plan, operator or getuser(), target)
     return replace(result, title=f"{result.title} (practised)") if practise else result
+
+
+def _simulated(config: Path | None) -> Configuration:
+    if config is None:
+        return bench_configuration()
+    return parse_configuration(with_simulated_watchdogs(load_configuration(config).text))

@@ -44,7 +44,7 @@ FRICTION = """\
 viscous_nm_s = 0.002
 
 """
-TAIL = """\
+WATCHDOGS = """\
 # The endpoints of the watchdogs in the simulated drives.
 [[watchdog_endpoints]]
 firmware = "0.6.11"
@@ -52,6 +52,8 @@ hardware = "0.0.0"
 enable = 2
 timeout = 1
 
+"""
+TAIL = """\
 [faults]
 late_s = 0.5
 quiet_s = 0.5
@@ -97,7 +99,7 @@ def configuration_template(rig: Rig = TWO_FLIPPERS) -> str:
         parts.append(drive.replace("{", "{{").replace("}", "}}"))
     parts.append("# As a calibration of these joints would show.\n")
     parts += [FRICTION.format(joint=joint) for joint in rig.joints]
-    return "".join([*parts, TAIL])
+    return "".join([*parts, WATCHDOGS, TAIL])
 
 
 CONFIGURATION = configuration_template()
@@ -146,6 +148,18 @@ def _paths(folder: Path, logs: Path) -> dict[str, str]:
     return {name: json.dumps(str(path)) for name, path in paths.items()}
 
 
+def with_simulated_watchdogs(text: str) -> str:
+    """Return a robot's configuration that knows the firmware of the simulated drives too."""
+    document: dict[str, Any] = tomlkit.parse(text)
+    _add_watchdogs(document)
+    return tomlkit.dumps(document)
+
+
+def _add_watchdogs(document: dict[str, Any]) -> None:
+    endpoints = tomllib.loads(WATCHDOGS)["watchdog_endpoints"]
+    document.setdefault("watchdog_endpoints", tomlkit.aot()).extend(endpoints)
+
+
 def local_copy(text: str, folder: Path, logs: Path) -> str:
     """Return a robot's configuration for this computer: local buses, and sockets, bounds and logs as of `simulate`.
 
@@ -158,8 +172,10 @@ def local_copy(text: str, folder: Path, logs: Path) -> str:
         bus |= {"interface": "mudskipper_local", "channel": str(make_own_folder(folder / f"bus{number}"))}
     for group in ("read_group", "drive_group"):  # of the robot's computer
         document.get("status", {}).pop(group, None)
+    if document.get("emergency_stop", {}).get("source") in ("gpio", "key"):  # likewise
+        del document["emergency_stop"]
     local = tomllib.loads(TAIL.format(**_paths(folder, logs)))
-    document.setdefault("watchdog_endpoints", tomlkit.aot()).extend(local.pop("watchdog_endpoints"))
+    _add_watchdogs(document)
     if document.get("pose", {}).get("source") not in (None, "", "none"):
         local["pose"]["source"] = "socket"
     for section, values in local.items():

@@ -134,12 +134,13 @@ def test_any_configuration_is_simulated_on_local_buses(
     monkeypatch.chdir(short_folder)
     text = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
     text = text.replace("[status]", '[status]\ndrive_group = "nobody-here"') + "[bus.left.options]\nfd = false\n"
+    text += '[emergency_stop]\nsource = "gpio"\ndevice = "/dev/gpiochip0"\n'
     Path("robot.toml").write_text(text.replace('"socketcan"', '"kvaser"'), encoding="utf-8")
     assert main(["simulate", "--config", "robot.toml", "--local"]) == exit_codes.OK
     path = named_folder(shared.SIMULATED) / "mudskipper.toml"
     assert f"mudskipperd --config {path}" in capsys.readouterr().out
     local, robot = load_configuration(path), parse_configuration(calibrated(text))
-    assert {bus.interface for bus in local.bus.values()} == {"mudskipper_local"}
+    assert {bus.interface for bus in local.bus.values()} == {"mudskipper_local"} and not local.emergency_stop.source
     assert (local.drive, local.geometry, local.gait) == (robot.drive, robot.geometry, robot.gait)
     assert main(["simulate", "--reset"]) == exit_codes.UNHEALTHY  # it has ended
     assert main(["simulate", "--local"]) == exit_codes.USAGE

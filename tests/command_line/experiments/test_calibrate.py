@@ -33,8 +33,12 @@ def test_one_command_finds_what_a_simulated_robot_was_built_with(
     assert main(command) == exit_codes.REFUSED  # it is finished
 
 
-def test_a_person_must_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("own", [False, True])
+def test_a_person_must_answer(own: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", (tmp_path / "empty").open("w+"))
     command = ["calibrate", "--practise", "--joint", "left_sweep", "--out", str(tmp_path / "out")]
+    if own:  # a new file knows no watchdog of the simulated drives
+        assert main(["init", "--defaults", "--drive", "odrive", str(tmp_path / "own.toml")]) == exit_codes.OK
+        command += ["--config", str(tmp_path / "own.toml")]
     assert main(command) == exit_codes.REFUSED
     assert (tmp_path / "out" / "notebook.jsonl").exists()
