@@ -118,6 +118,9 @@ def run_result(run: Run, headline: Entry) -> Result:
         texts["Strides"] = f"{SINCE} Brackets mark an invalid value, ≥ a lower bound."
         tables.append(_table("Strides", stride_rows(run)))
         tables += [_table("Strides", estimate_rows(run, name), f"{name} by stride") for name in COEFFICIENTS]
+    if run.supply:
+        texts["Supply"] = f"What each drive reported of its supply. {SINCE}"
+        tables.append(_table("Supply", [_supply_row(each, begin_s) for each in run.supply]))
     if run.log:
         if reports := operator_reports(run.log.events):
             texts["Notes"] = f"What operators wrote into the log. {SINCE}"
@@ -141,6 +144,7 @@ def _run_summary(run: Run, headline: Entry) -> Entry:
         "strides": [stride_report(stride) for stride in run.replay.strides],
         "fits": [{name: _fit_summary(getattr(fits, name)()) for name in COEFFICIENTS} for fits in run.replay.fits],
         "map": map_report(run.replay.map),
+        "supply": list(run.supply),
         "faults": [cause._asdict() for cause in run.causes],
         "events": run.log.events if run.log else [],
         "findings": finding_reports(run.paths[0], run.replay.findings),
@@ -237,6 +241,12 @@ def _cause_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
         }
         for cause in run.causes
     ]
+
+
+def _supply_row(supply: Mapping[str, Any], begin_s: float) -> dict[str, Any]:
+    at_s = supply["lowest_stamp_s"] - begin_s
+    volts = {"lowest (V)": supply["lowest_v"], "at": at_s, "highest (V)": supply["highest_v"]}
+    return {"drive": supply["joint"], **volts, "most current (A)": number(supply["most_a"], 2)}
 
 
 def _report_row(at_s: float, report: OperatorReport) -> dict[str, Any]:

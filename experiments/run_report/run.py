@@ -23,6 +23,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_o
 from experiments.pictures.stride_choice import Stride, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
 from experiments.reports.mud_names import mud_label, mud_name
+from experiments.run_report.supply_range import SupplyRange
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes
 from logs.files.log_error import LogError, Watch
@@ -65,6 +66,7 @@ class Run:
     strides: DataFrame  # STRIDES; the mud is empty where it is not certain, duration and step are NaN where unknown
     estimates: DataFrame  # ESTIMATES: a row for each coefficient of each flipper; `samples` of a fit, or None
     causes: Sequence[LoggedCause]
+    supply: Sequence[dict[str, Any]] = ()  # what each drive reported of its supply, of those that did
 
 
 def read_runs(
@@ -89,11 +91,12 @@ def _read_run(
 ) -> Run:
     path = paths[0]
     label = LABEL.search(path.name) if log is None else None
+    supply: Sequence[dict[str, Any]] = ()
     if log is None:
         lab = read_lab_csv(path, vertical)
         replay, walks = replay_lab(lab), [walk_of_lab(path, lab)] if lab.flippers else []
     else:
-        replay, walks = _read_ticks(path, log, watch)
+        replay, walks, supply = _read_ticks(path, log, watch)
     described = trial_of(log).get("mud") if log else None
     named = described or (f"{label[1][:-1]} N" if label else "")
     muds_from = MudsFrom.NAMES if layout else MudsFrom.LOG if described else MudsFrom.FILE if label else MudsFrom.ROBOT
@@ -113,18 +116,20 @@ def _read_run(
         strides=strides,
         estimates=_describe_estimates(replay, walks, strides),
         causes=read_causes(log.events, log.configuration_text) if log else [],
+        supply=supply,
     )
 
 
-def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list[RecordedWalk]]:
-    """Return the estimates and the walks of a log. Raises LogError."""
+def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list[RecordedWalk], list[dict[str, Any]]]:
+    """Return the estimates, the walks and the supply of a log. Raises LogError."""
     configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(log.rows)
-    running = RunningReplay(path, log, configuration)
+    running, supply = RunningReplay(path, log, configuration), SupplyRange(configuration.rig.joints)
     for ticks in watched_blocks(log, watch, "ticks replayed"):
         running.add(ticks)
         traces.add(ticks)
-    numbers = range(1, len(traces.walks) + 1)
-    return running.finish(), [walk_of_trace(log, configuration, traces, number) for number in numbers]
+        supply.add(ticks)
+    walks = [walk_of_trace(log, configuration, traces, number) for number in range(1, len(traces.walks) + 1)]
+    return running.finish(), walks, supply.rows()
 
 
 def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk]) -> MudLayout | None:

@@ -11,6 +11,7 @@ from command_line import exit_codes
 from command_line.logs import log_report
 from command_line.main import main
 from control.controller import WalkOrder
+from control.records import JOINTS
 from experiments.run_report import run as run_module
 from experiments.study.result import Result
 from firmware_host.configuration.configuration import Configuration
@@ -38,6 +39,7 @@ def test_the_page_shows_every_walk_stride_and_event(
     assert len(report["strides"]) == len(report["fits"]) == len(log.strides) > 0
     assert report["summary"]["ticks"] == len(log.ticks) and report["log"] == [two_walks.name]
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert [each["joint"] for each in report["supply"]] == [*JOINTS] and "lowest supply (V)" in page
     assert page.count("data:image/png") == 5  # two of each of the two walks, and the fits
     for name in ("walk-1", "walk-2", "strides-1", "strides-2", "fits"):
         starts = {ending: (folder / f"{name}{ending}").read_bytes()[:5] for ending in (".png", ".svg", ".pdf")}
