@@ -1,6 +1,8 @@
 """`mudskipper upgrade`: what another version changes, and when it is not installed."""
 
+import json
 import os
+import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +15,8 @@ from command_line.init.key_reference import configuration_keys
 from command_line.install import upgrade as upgrade_module
 from command_line.install.service_plan import DEFAULT_PREFIX, LIVE_UNIT, Outcome, load_sources, source_folder
 from command_line.install.upgrade import key_changes, upgrade
-from control.modes import ENERGISED
+from control.modes import ENERGISED, Mode
+from tests.folders import ROOT
 
 PREFIX = Path(DEFAULT_PREFIX)
 
@@ -93,11 +96,20 @@ def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Comput
     assert refused.value.status == exit_codes.CONFIGURATION and not computer.installed
 
 
-def test_the_package_refuses_in_the_same_modes() -> None:
-    """The scripts of the package also protect an upgrade by apt or dpkg alone."""
-    script = (Path(__file__).parents[3] / "debian" / "prerm").read_text(encoding="utf-8")
-    (modes,) = [line for line in script.splitlines() if "hold" in line]
-    assert set(modes.rstrip(")").split(" | ")) == {mode.name.lower() for mode in ENERGISED}
+@pytest.mark.parametrize("mode", ["", *(mode.name.lower() for mode in Mode)])
+def test_the_package_refuses_in_the_same_modes(mode: str, tmp_path: Path) -> None:
+    """The scripts of the package also protect an upgrade by apt or dpkg alone; a broken program prevents none."""
+    answer = f"#!/bin/sh\necho '{json.dumps({'mode': mode})}'" if mode else "#!/none"
+    for name, text in (("mudskipper", answer), ("systemctl", "#!/bin/sh\nexit 3")):  # no service is active
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    path = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    script = (ROOT / "debian" / "prerm").read_text(encoding="utf-8").replace("/opt/mudskipper/venv/bin", str(tmp_path))
+    command = ["sh", "-c", script, "prerm", "upgrade"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, env=path)
+    refuses = mode in {each.name.lower() for each in ENERGISED}
+    assert ended.returncode == refuses
+    assert ended.stderr.count("\n") == refuses and (f"in mode {mode}, " in ended.stderr) == refuses
 
 
 def test_a_key_that_is_gone_without_a_similar_one_is_named_alone() -> None:

@@ -134,6 +134,7 @@ def test_a_closed_connection_is_not_reported_as_a_missing_daemon(command: str, m
 
 BACK = "moves it back, then 'mudskipper clear'"
 
+
 def cause(name: str, what_to_do: str) -> Report:
     return {"name": name, "message": f"It is {name}.", "what_to_do": what_to_do, "reaction": "damping"}
 
