@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from command_line.robot_text import is_stale, torque_state, unheard_text
+from command_line.robot_text import is_stale, quota_text, torque_state, unheard_text
 from control.records import JOINTS
 
 
@@ -34,3 +34,15 @@ def test_the_status_names_drives_that_were_not_heard_yet() -> None:
     drives[3] = drives[3] | {"angle_age_s": None}
     line = unheard_text({"drives": drives})
     assert "left_adduction, right_adduction" in line and "left_sweep" not in line
+
+
+@pytest.mark.parametrize(
+    ("quota_bytes", "free", "text"),
+    [
+        (8e9, 0.1, "at more than 8 GB of logs or less than 10 % of the disk free the oldest copied log is deleted"),
+        (0, 0.05, "at less than 5 % of the disk free the oldest copied log is deleted, uncopied ones last"),
+        (0, 0.0, "no log is deleted"),
+    ],
+)
+def test_it_is_said_which_logs_are_deleted_and_when(quota_bytes: int, free: float, text: str) -> None:
+    assert quota_text(quota_bytes, free).startswith(text)

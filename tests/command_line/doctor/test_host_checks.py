@@ -193,6 +193,7 @@ def test_logs_that_were_cut_off_are_reported_if_no_daemon_is_writing_them(comput
     assert storage(computer, "/logs")["unfinished_logs"].level is WARN
     assert "unfinished_logs" not in storage(computer, "/logs", daemon_runs=True)
     assert storage(computer, "/elsewhere")["unfinished_logs"].level is OK
+    assert storage(computer, "/elsewhere")["quota"].text.endswith("uncopied ones last; 0 of 0 not copied")
 
 
 @pytest.mark.parametrize(

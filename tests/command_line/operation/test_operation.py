@@ -46,6 +46,7 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert all(drive["closed_loop"] for drive in status["drives"])
     table = bench.run("status").stdout
     assert "walking" in table and "left_sweep" in table and "\033" not in table
+    assert "V in the last stride\n" in table and "uncopied ones last" in table
     assert bench.run("stop").stdout == "hold\n"
     assert bench.run("disarm").stdout == "idle\n"
     path = bench.stop_daemon()
