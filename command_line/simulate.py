@@ -30,16 +30,18 @@ def simulate(
     bus: Annotated[str, Option("of the local bus")] = SIMULATED,
     config: Annotated[Path | None, Option("the robot of this configuration, on its buses")] = None,
     local: Annotated[bool, Option("with --config: on local buses instead of its own")] = False,
-    reset: Annotated[bool, Option("move the joints of the robot that is simulated back into their range")] = False,
+    reset: Annotated[
+        bool, Option("move the joints of the robot that is simulated back into their range", alternative="task")
+    ] = False,
     emergency_stop: Annotated[
-        bool, Option("press the emergency stop of the robot that is simulated, or release it")
+        bool, Option("press the emergency stop of the robot that is simulated, or release it", alternative="task")
     ] = False,
     mud: Annotated[
         tuple[str, ...],
-        Option("water content: 48.5, 53.1, 45.3", metavar="W", choices=tuple(MUDS), alternative="ground"),
+        Option("water content: 48.5, 53.1, 45.3", metavar="W", choices=tuple(MUDS), alternative="task"),
     ] = (),
-    world: Annotated[Path | None, Option("describes the ground and more", alternative="ground")] = None,
-    on_blocks: Annotated[bool, Option("no mud: the flippers move in air, for the bench", alternative="ground")] = False,
+    world: Annotated[Path | None, Option("describes the ground and more", alternative="task")] = None,
+    on_blocks: Annotated[bool, Option("no mud: the flippers move in air, for the bench", alternative="task")] = False,
     seed: Seed = 1,
 ) -> int:
     if local and not config:

@@ -15,7 +15,7 @@ from socket import AF_INET, AF_INET6
 from typing import Annotated, NoReturn, Protocol
 
 from command_line import exit_codes
-from command_line.errors import CommandError
+from command_line.errors import CommandError, usage_error
 from command_line.screen import complain
 from command_line.shared_options import Socket
 from experiments.study.option import Option
@@ -46,6 +46,8 @@ def live(
     ] = (),
     port: Annotated[int, Option("0: a free one (default: 8765)", low=0, high=65535)] = 8765,
 ) -> int:
+    if name and not page:
+        raise usage_error("--name belongs to --page: viewers open any address")
     _require_address(host, port)
     try:
         audience, address = _open_page(host, port, Path(socket), name) if page else _open_viewers(host, port)

@@ -149,9 +149,9 @@ def joy(
     *,
     socket: Socket,
     device: Annotated[
-        str, Option("gamepad or keyboard in /dev/input (default: the only gamepad)", metavar="PATH")
+        str, Option("gamepad or keyboard in /dev/input (default: the only gamepad)", metavar="PATH", alternative="pad")
     ] = "",
-    keyboard: Annotated[bool, Option("the keys of this terminal: hold one, and it repeats")] = False,
+    keyboard: Annotated[bool, Option("the keys of this terminal: hold one, and it repeats", alternative="pad")] = False,
     depth: Annotated[
         float | None, Option("insertion depth (default: adaptive)", unit="cm", low=LEAST_DEPTH_CM, high=20.0)
     ] = None,
