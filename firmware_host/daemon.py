@@ -246,17 +246,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="mudskipperd", description="The robot's real-time controller.", allow_abbrev=False
     )
-    parser.add_argument("--config", type=Path, default=Path("/etc/mudskipper/mudskipper.toml"))
+    parser.add_argument("--config", type=Path, action="append", help="(default: /etc/mudskipper/mudskipper.toml)")
     parser.add_argument("--check-config", action="store_true", help="validate the configuration and exit")
     options = parser.parse_args(arguments)
+    path, *others = options.config or [Path("/etc/mudskipper/mudskipper.toml")]
+    if others:
+        parser.error(f"argument --config: is given twice, as {path} and {others[0]}; give it once")
     try:
-        configuration = load_configuration(options.config)
+        configuration = load_configuration(path)
         rights = load_rights(configuration.status)
     except ConfigurationError as problem:
         return _refuse([f"mudskipperd: {message}" for message in problem.problems], EXIT_CONFIGURATION)
     _print_warnings("mudskipperd: ", configuration.warnings)
     if options.check_config:
-        print(f"mudskipperd: {options.config} is valid")
+        print(f"mudskipperd: {path} is valid")
         return 0
     shutdown = Shutdown()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):

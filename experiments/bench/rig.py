@@ -204,7 +204,10 @@ def on_channels(configuration: Configuration, given: Sequence[str]) -> Configura
             raise BenchError(f"--can {argument}: a channel is missing, as in --can left=can0.")
         if equals and name not in configuration.bus:
             raise BenchError(f"--can {argument}: no bus {name!r} is configured, only {', '.join(configuration.bus)}.")
-        channels |= {name: channel} if equals else dict.fromkeys(configuration.bus, channel)
+        added = {name: channel} if equals else dict.fromkeys(configuration.bus, channel)
+        if twice := channels.keys() & added.keys():
+            raise BenchError(f"--can {argument}: bus {min(twice)} is given twice; give it once.")
+        channels |= added
     first_on = {channel: name for name, channel in reversed(channels.items())}
     moved = {name: first_on[channel] for name, channel in channels.items() if first_on[channel] != name}
     buses = {name: bus for name, bus in configuration.bus.items() if name not in moved}

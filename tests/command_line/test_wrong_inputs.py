@@ -40,6 +40,7 @@ WRONG_COMMAND_LINES = [  # and what the message names
     ("init - --node left_sweep=1 --node left_sweep=2", "left_sweep is given twice"),
     ("init - --set drop_m=0.05 --set drop_m=0.06", "drop_m is given twice"),
     ("experiment lablogs . --group 12*=soft --group 12*=firm --out none", "12* is given twice"),
+    ("mudskipperd --check-config --config robot.toml --config keys.toml", "--config: is given twice"),
     ("walk --strides 2 --strides 3", "--strides: is given twice"),
     ("experiment sweep --simulated --out a --out b", "--out: is given twice"),
     *((f"move {text}", text) for text in ("tail=10", "left_sweep", "left_sweep=", "left_sweep=far", "=3")),

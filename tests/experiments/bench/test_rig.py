@@ -121,6 +121,12 @@ def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configura
         on_channels(replace(configuration, drive=drive), ["can0"])
 
 
+@pytest.mark.parametrize("given", [["can0", "can1"], ["left=can0", "left=can1"], ["right=can1", "can0"]])
+def test_a_bus_has_one_channel(configuration: Configuration, given: list[str]) -> None:
+    with pytest.raises(BenchError, match=rf"--can {given[1]}: bus (left|right) is given twice"):
+        on_channels(configuration, given)
+
+
 @pytest.mark.parametrize("given", ["middle=can0", "left=", ""])
 def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, given: str) -> None:
     with pytest.raises(BenchError, match="--can"):
