@@ -74,7 +74,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=WORKERS)
     parser.add_argument("--no-shrink", action="store_true", help="print broken seeds as they are")
     options = parser.parse_args(arguments)
-    first, last = (int(options.seeds), int(options.seeds) + 1) if options.only else span_of(options.seeds)
+    try:
+        first, last = (int(options.seeds), int(options.seeds) + 1) if options.only else span_of(options.seeds)
+    except ValueError:
+        parser.error(f"{options.seeds}: must be a count or FIRST:LAST, with --only one seed")
     begun_s = time.monotonic()
     outcomes = run_campaign(first, last, options.workers, options.style)
     if options.only:

@@ -58,6 +58,13 @@ def test_a_campaign_runs_its_seeds(capsys: pytest.CaptureFixture[str]) -> None:
     assert "1 seeds in" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("given", [("5:6", "--only"), ("many",)])
+def test_seeds_that_are_no_number_are_refused(given: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(given)
+    assert f"{given[0]}: must be a count or FIRST:LAST, with --only one seed" in capsys.readouterr().err
+
+
 def test_blocks_share_their_surroundings_and_cover_every_seed() -> None:
     spans = list(blocks(*span_of("5:40")))
     assert [seed for span in spans for seed in range(*span)] == list(range(5, 40))
