@@ -40,6 +40,7 @@ class OpenedLog:
             "files": ", ".join(path.name for path in self.paths[:3]) + ", ..." * (len(self.paths) > 3),
             "robot": f"{self.metadata.get('robot', '?')}, {', '.join(self.rig.joints)}",
             "started": f"{self.metadata.get('started', '?')}, mudskipper {self.metadata.get('version', '?')}",
+            "trial": ", ".join(f"{name} {text}" for name, text in self.trial.items())[:100] or "not described",
             "length": f"{self.ticks['stamp_s'][-1] - self.ticks['stamp_s'][0]:.1f} s" if known else "?",
             "ticks": f"{len(self.ticks)} rows of {len(self.ticks.dtype.names or ())} fields",
             "strides": f"{len(self.strides)} rows of {len(self.strides.dtype.names or ())} fields",

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,8 @@ def test_a_log_is_arrays_by_field_name(log: mudskipper.OpenedLog) -> None:
     assert log.complete and not log.unknown_fields
     shown = str(log).splitlines()
     assert len(shown) <= 10 and f"{len(log.ticks)} rows" in str(log) and "whole" in shown[-1]
+    assert "trial    not described" in shown
+    assert "trial    mud A, trial 3" in str(replace(log, metadata={"trial": '{"mud": "A", "trial": "3"}'})).splitlines()
 
 
 def test_ticks_become_a_table_with_a_column_for_each_joint(log: mudskipper.OpenedLog) -> None:
