@@ -13,7 +13,7 @@ from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.json_output import Answer
 from command_line.operation.mode_output import mode_answer
-from command_line.robot_text import MILD, position_text, stride_text
+from command_line.robot_text import MILD, mode_word, position_text, stride_text
 from command_line.screen import complain
 from operator_client.status_client import CallRefusedError, StatusClient
 
@@ -111,7 +111,7 @@ class LiveLine:
         self._shown = ""
 
     def show(self, report: dict[str, Any], hint: str = "Ctrl-C stops") -> None:
-        summary = f"{report['mode']}, {stride_text(report)}"
+        summary = f"{mode_word(report)}, {stride_text(report)}"
         if self._live:
             print(f"\r\033[K{summary}, {position_text(report)}; {hint}", end="", flush=True)
         elif summary != self._shown and not self._silent:

@@ -2,7 +2,7 @@
 
 import time
 
-from command_line.robot_text import at_depth, consequences_text, position_text, stride_text
+from command_line.robot_text import at_depth, consequences_text, mode_word, position_text, stride_text
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
 from control.records import COEFFICIENTS
@@ -25,7 +25,7 @@ def plain_line(history: History, now_s: float) -> str:
         return f"nothing heard for {history.silence_s(now_s):.1f} s, torque unknown: {history.problem}"
     report = history.status
     known = [f"{name} {at_depth(report['mud'][name])}" for name in COEFFICIENTS if report["mud"][name]]
-    line = ", ".join([report["mode"], stride_text(report), position_text(report), *known])
+    line = ", ".join([mode_word(report), stride_text(report), position_text(report), *known])
     if not report["causes"]:
         return line
     cause, *others = report["causes"]

@@ -32,7 +32,8 @@ def attended(bench: Bench, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 def report(mode: str, message: str = "", notice: str = "", reaction: str = "hold") -> dict[str, Any]:
     fault = {"message": message, "reaction": reaction} if message else None
-    return {"mode": mode, "fault": fault, "notice": notice, "stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
+    state = {"mode": mode, "power_cut": None, "fault": fault, "notice": notice}
+    return state | {"stride": 0, "phase": "swing", "depth_m": 0, "body_x_m": 0}
 
 
 STOPPED = "stopped by drive_silent: The left_sweep drive is silent. Check it."

@@ -6,11 +6,14 @@ from typing import Any
 
 import pytest
 
+from command_line.operation.attended_walk import LiveLine
+from command_line.operation.status import status_text
 from command_line.robot_text import BAD, OLD
 from command_line.watch.bars import bars
 from command_line.watch.history import History, Sample
 from command_line.watch.joint_plots import View
 from command_line.watch.mud_cells import BOUND, coefficient_rows, trend
+from command_line.watch.plain_lines import plain_line
 from command_line.watch.robot_cells import alarm_text, drive_rows, faults_text, machine_text
 from control.faults import FaultKind
 from control.records import FLIPPERS, JOINTS
@@ -52,6 +55,15 @@ def test_faults_of_one_cause_are_one_alarm(walked: ServedRobot, history: History
     first, advice = alarm_text(history, NOW_S).plain.split("\n")
     assert first.startswith(" FAULT ") and "8 faults" in first
     assert advice.startswith("-> ")
+
+
+def test_a_cut_of_the_power_takes_the_place_of_the_mode(history: History, capsys: pytest.CaptureFixture[str]) -> None:
+    history.status |= {"mode": "fault", "power_cut": "all drives fell silent at once"}
+    assert alarm_text(history, NOW_S).plain.startswith(" POWER CUT ")
+    assert plain_line(history, NOW_S).startswith("power cut, ")
+    assert status_text(history.status).startswith(f"{history.status['robot']}: power cut, ")
+    LiveLine().show(history.status)  # of `joy` and an attended walk
+    assert capsys.readouterr().out.startswith("power cut, ")
 
 
 def test_a_silent_drive_has_unknown_torque(history: History) -> None:
