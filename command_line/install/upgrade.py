@@ -76,6 +76,9 @@ def _describe(environment: Path, root: Path, run: Run) -> list[str]:
     written = [step for step in plan.steps if isinstance(step, WriteFile) and step.path != root / MANIFEST]
     for text in [*map(str, written), *plan.notes]:
         print(f"files          {text}")
+    if not configuration.exists():
+        print(f"configuration  there is no {configuration} yet")
+        return []
     checked = run((python, "-I", "-m", "firmware_host.daemon", "--check-config", "--config", str(configuration)))
     print(f"configuration  {configuration} is {'accepted' if checked.status == 0 else 'not accepted'}")
     return checked.text.strip().splitlines() if checked.status else []

@@ -13,7 +13,14 @@ from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
 from command_line.install import upgrade as upgrade_module
-from command_line.install.service_plan import DEFAULT_PREFIX, LIVE_UNIT, Outcome, load_sources, source_folder
+from command_line.install.service_plan import (
+    CONFIGURATION,
+    DEFAULT_PREFIX,
+    LIVE_UNIT,
+    Outcome,
+    load_sources,
+    source_folder,
+)
 from command_line.install.upgrade import key_changes, upgrade
 from control.modes import ENERGISED, Mode
 from tests.folders import ROOT
@@ -94,6 +101,12 @@ def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Comput
     with pytest.raises(CommandError, match="silence_s") as refused:
         computer.upgrade()
     assert refused.value.status == exit_codes.CONFIGURATION and not computer.installed
+
+
+def test_a_computer_without_a_configuration_has_none_to_refuse(computer: Computer) -> None:
+    computer.refusal = "mudskipperd: there is no such file"
+    (computer.root / CONFIGURATION).unlink()
+    assert computer.upgrade() == exit_codes.OK and computer.installed
 
 
 @pytest.mark.parametrize("mode", ["", *(mode.name.lower() for mode in Mode)])
