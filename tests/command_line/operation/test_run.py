@@ -14,7 +14,7 @@ from operator_client.status_client import CallRefusedError, StatusClient
 from tests.folders import ROOT
 
 LAWS = ROOT / "examples" / "laws"
-MODE = {"fault": None, "notice": "", "stride": 0, "phase": "swing", "depth_m": 0.0, "body_x_m": 0.0}
+MODE = {"fault": None, "power_cut": None, "notice": "", "stride": 0, "phase": "swing", "depth_m": 0.0, "body_x_m": 0.0}
 
 
 class WalkOfTwoStrides(StatusClient):
