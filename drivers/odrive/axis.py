@@ -65,10 +65,9 @@ class OdriveAxis(CanSimpleAxis):
     def _build_health(self) -> DriveHealth:
         flags, settings = self._error_flags | self.disarm_reason, self.settings
         common = super()._build_health()
-        firmware = ".".join(map(str, settings.version)) if settings.version else ""
-        build = f"firmware {firmware}, hardware {settings.hardware}"
+        build = f"firmware {settings.firmware}, hardware {settings.hardware}"
         return common._replace(
-            firmware=firmware,
+            firmware=settings.firmware,
             supported_firmware=".".join(map(str, SUPPORTED)),
             firmware_supported=settings.supported,
             hardware=settings.hardware,

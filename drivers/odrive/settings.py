@@ -91,11 +91,16 @@ class DriveSettings:
         return self.version is not None and self.version[:2] == SUPPORTED
 
     @property
+    def firmware(self) -> str:
+        """The version as ODrive writes it; empty until it is known."""
+        return ".".join(map(str, self.version or ()))
+
+    @property
     def watchdog_endpoints(self) -> WatchdogEndpoints | None:
         """The numbers of the drive's own build, once its version is known."""
         if self.version is None:
             return None
-        build = (".".join(str(part) for part in self.version), self.hardware)
+        build = (self.firmware, self.hardware)
         return next((each for each in self._endpoints if (each.firmware, each.hardware) == build), None)
 
     @property

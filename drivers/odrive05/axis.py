@@ -151,13 +151,13 @@ class Odrive05Axis(CanSimpleAxis):
         self._following = False
 
     def _build_health(self) -> DriveHealth:
-        version = self.settings.version  # which only firmware 0.6 has
+        settings = self.settings  # which know a version of firmware 0.6 only
         errors = codec.errors_text(self._error_flags, *self._part_errors)
         common = super()._build_health()
         return common._replace(
-            firmware=".".join(map(str, version)) if version else FIRMWARE if self._counts_known else "",
+            firmware=settings.firmware or (FIRMWARE if self._counts_known else ""),
             supported_firmware=FIRMWARE,
-            firmware_supported=self._counts_known and version is None,
+            firmware_supported=self._counts_known and settings.version is None,
             watchdog_s=self._proof.watchdog_s,
             watchdog_advice="clear the drive's errors, let no other program send to it, and wait for a second",
             power_cut=bool(self._error_flags & codec.ERROR_ESTOP),
