@@ -18,6 +18,7 @@ from pandas import DataFrame
 from control.records import COEFFICIENTS, Estimate, StrideEstimate
 from estimation.estimation_parameters import Method
 from experiments.lablogs.recording import Recording, read_recording
+from experiments.reports.depth_law import re_entered
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.files.log_error import LogError
 from logs.lab.body_track import VERTICAL_AXIS
@@ -108,8 +109,7 @@ def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame
     keys = [frame["flipper"], frame["coefficient"]]
     restarts = frame["index"].groupby(keys).diff() <= 0.0
     frame = frame.assign(walk=restarts.groupby(keys).cumsum(), **shared)
-    advanced_m = frame.groupby(["flipper", "coefficient", "walk"])["step_m"].shift().abs()
-    return frame.assign(re_entered=advanced_m < HOLE_M)
+    return frame.assign(re_entered=re_entered(frame.groupby(["flipper", "coefficient", "walk"]), HOLE_M))
 
 
 def _kind_of(estimate: Estimate) -> str:

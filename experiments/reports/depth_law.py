@@ -10,7 +10,8 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from pandas import DataFrame
+from pandas import DataFrame, Series
+from pandas.api.typing import DataFrameGroupBy
 
 from estimation.strokes.depth_line import REPEATABILITY, SHEAR_LAW, STROKE_LAW
 
@@ -42,6 +43,14 @@ def fit_depth_law(strides: DataFrame) -> DepthLaw | None:
     residuals = logs_k - np.average(logs_k, weights=weights) - exponent * apart
     birge = max(1.0, float(np.sum(weights * residuals**2)) / (len(known) - 2))
     return DepthLaw(exponent, sqrt(birge / square), float(depths_m.min()), float(depths_m.max()))
+
+
+def re_entered(walks: DataFrameGroupBy, plate_width_m: float) -> Series:
+    """Return which strides began in the hole of the one before: the body had advanced by less than a plate's width.
+
+    Mud is weaker there, at any depth. Without a pose it is not known, and False.
+    """
+    return walks["step_m"].shift().abs() < plate_width_m
 
 
 def law_finding(coefficient: str, law: DepthLaw | None) -> str:

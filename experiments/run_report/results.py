@@ -17,7 +17,7 @@ from math import fsum, hypot, isfinite, sqrt
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame, Series
+from pandas import DataFrame
 
 from control.faults import FAULT_KINDS, Reaction
 from control.records import COEFFICIENTS, UNKNOWN
@@ -27,7 +27,7 @@ from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
-from experiments.reports.depth_law import fit_depth_law, law_finding
+from experiments.reports.depth_law import fit_depth_law, law_finding, re_entered
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
 from firmware_host.operator.reports import law_report
@@ -46,7 +46,9 @@ DOING = {Outcome.GOOD: "good", Outcome.SLIPPING: "slipped", Outcome.STUCK: "stuc
 def headline_of(run: Run) -> Entry:
     """Return the result of all walks, and of each mud in the order of the walk without strides of uncertain mud."""
     reactions = [reaction_of(cause) for cause in run.causes]
-    muds = run.strides[run.strides["mud"] != ""].groupby("mud", sort=False)
+    plate_width_m = max((walk.geometry.plate.width_m for walk in run.walks), default=0.0)
+    strides = run.strides.assign(re_entered=re_entered(run.strides.groupby("walk"), plate_width_m))
+    muds = strides[strides["mud"] != ""].groupby("mud", sort=False)
     return {
         "complete": run.log is None or run.log.complete,  # False where the writer was cut off, or still writes
         "trial": trial_of(run.log) if run.log else {},
@@ -54,7 +56,7 @@ def headline_of(run: Run) -> Entry:
         **travel_of(run.walks),
         "strides": len(run.strides),
         "outcomes": _count_outcomes(run.strides),
-        "muds": [_mud_result(run, str(mud), strides) for mud, strides in muds],
+        "muds": [_mud_result(run, str(mud), of_mud) for mud, of_mud in muds],
         "stops": sum(reaction > Reaction.WARN for reaction in reactions),
         "warnings": sum(reaction is Reaction.WARN for reaction in reactions),
     }
@@ -90,7 +92,7 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
     estimates = run.estimates[run.estimates["mud"] == mud]
     by_flipper = {flipper: estimates[estimates["flipper"] == flipper] for flipper in run.replay.flippers}
     values = estimates[estimates["valid"] & ~estimates["at_least"]]
-    fresh = values.merge(run.strides.loc[~_re_entered(run), ["walk", "index"]])
+    fresh = values.merge(strides.loc[~strides["re_entered"], ["walk", "index"]])
     law = _ground_law(run, estimates)
     return {
         "mud": mud,
@@ -104,15 +106,6 @@ def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
         "findings": [*_depth_findings(fresh), *ground_finding(law, len(strides))],
         "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
     }
-
-
-def _re_entered(run: Run) -> Series:
-    """Return which strides began in the hole of the one before: the body had advanced by less than a plate's width.
-
-    Mud is weaker there, whatever the depth. Without a pose it is not known.
-    """
-    advanced_m = run.strides.groupby("walk")["step_m"].shift().abs()
-    return advanced_m < max((walk.geometry.plate.width_m for walk in run.walks), default=0.0)
 
 
 def speed_of(strides: DataFrame) -> Entry:
