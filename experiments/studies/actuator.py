@@ -22,9 +22,7 @@ from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Ending, Session
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import load_configuration
-
-INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
+from firmware_host.configuration.loading import INSTALLED, load_configuration
 
 
 def parse_weights(text: str) -> tuple[float, ...]:

@@ -16,12 +16,12 @@ from experiments.actuator.simulation import bench_configuration
 from experiments.calibration.calibration import calibrate_robot
 from experiments.calibration.report import FILES as FILES
 from experiments.calibration.robots import CalibratedRobot, build_with_errors
-from experiments.studies.actuator import INSTALLED, Lever, LeverTolerance, Passes, WeightTolerance, parse_weights
+from experiments.studies.actuator import Lever, LeverTolerance, Passes, WeightTolerance, parse_weights
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.loading import INSTALLED, load_configuration, parse_configuration
 from simulation.harness.local_setup import with_simulated_watchdogs
 
 HAS_ROBOT = False  # no daemon's, at its socket

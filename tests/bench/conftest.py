@@ -18,7 +18,7 @@ from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.loading import INSTALLED, load_configuration
 from simulation.harness.blocks import resting_drop_m
 from tests.bench.staged_bench import (
     SKIPPED,
@@ -31,7 +31,6 @@ from tests.bench.staged_bench import (
 )
 from tests.folders import EXAMPLE_CONFIGURATION
 
-INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 REPORT = pytest.StashKey[BenchReport]()
 NOT_ASKED_FOR = "needs a robot (--can CHANNEL, or --config FILE) or --simulated"
 
