@@ -39,7 +39,7 @@ class BusLock:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._socket.bind(name)
-            self._socket.listen(socket.SOMAXCONN)  # nobody accepts, so each question for the owner takes a place
+            self._socket.listen(socket.SOMAXCONN)  # each question for the owner stays in the queue: none is accepted
         except OSError as problem:
             self._socket.close()
             if problem.errno != errno.EADDRINUSE:

@@ -1,4 +1,7 @@
-"""The voltage and the current of each drive's supply over a log, which tells a weak cable from a weak battery."""
+"""The voltage and the current of each drive's supply over a log.
+
+A weak cable lowers the voltage of one drive, a weak battery that of all.
+"""
 
 from collections.abc import Sequence
 from typing import Any
