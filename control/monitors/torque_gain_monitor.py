@@ -19,9 +19,9 @@ A motor is too strong if the lower bound is, and too weak if the upper one is. W
 SAME_FRACTION, the strokes had too little acceleration for a verdict. A rotor with the encoder that crosses the play of
 a belt moves alone, up to three times as easily as its joint, and then hits it: after both, the torque has moved the
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
-cross 1 degree. A sweep that the mud lets go of is thrown through that play, so no block counts that is faster than any
-path. One stride proves a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the inertias,
-which must be as exact.
+cross 1 degree, and without the last three of a stroke, which may end before the hit. A sweep that the mud lets go of is
+thrown through that play, so no block counts that is faster than any path. One stride proves a gain beyond a factor of
+2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -143,8 +143,9 @@ class JointStrokes:
 
     def end_stroke(self) -> None:
         blocks, joins = self._stroke, self._joins
-        if len(blocks) > joins:
-            rows = zip(*[iter(blocks)] * joins, strict=False)
+        if len(blocks) >= 2 * joins:
+            crossed = blocks[:-joins] if joins > 1 else blocks  # in the last ones a rotor may still be in its play
+            rows = zip(*[iter(crossed)] * joins, strict=False)
             joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
             self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined)))
         blocks.clear()

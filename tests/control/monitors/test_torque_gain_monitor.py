@@ -6,6 +6,7 @@ from control.joint_friction import NO_FRICTION
 from control.monitors.torque_gain_monitor import (
     BLOCK_TICKS,
     FACTOR_OF_ONE,
+    FACTOR_OF_THREE,
     JOINED_BLOCKS,
     JointStrokes,
     Moments,
@@ -60,3 +61,14 @@ def test_a_rotor_that_crosses_the_play_of_its_belt_is_no_strong_motor(gain: floa
     torques_mnm += [3.2, 3.1, 2.1, 3.2, 3.3, 1.5, 4.5, 2.8, 3.5, 0.2, 3.2, 3.5]
     stride = stride_of(crossing + together, [each / gain / 1e3 for each in torques_mnm])
     assert (stride.gain_beyond(FACTOR_OF_ONE) is not None) == is_wrong
+
+
+@pytest.mark.parametrize(("gain", "is_wrong"), [(1.0, False), (2.5, True)])
+def test_a_rotor_that_brakes_alone_at_the_end_of_a_swing_is_no_strong_motor(gain: float, is_wrong: bool) -> None:
+    """Measured in another swing: the rotor is at rest before it has crossed the play."""
+    speeds = [1.17, 1.58, 1.57, 1.48, 1.32, 1.39, 1.32, 1.39, 1.42, 1.44, 1.35, 1.37, 1.44, 1.35, 1.37, 1.38, 1.45]
+    speeds += [1.37, 1.38, 1.39, 1.43, 1.4, 1.36, 1.4, 1.36, 1.4, 1.4, 1.42, 1.34, 1.37, 1.42, 1.4, 0.96, 0.45]
+    torques_mnm = [20.3, 7.1, 3.4, 3.4, 6.7, 5.9, 10.2, 8.6, 7.7, 4.9, 6.8, 10.1, 5.3, 7.0, 8.6, 10.2]
+    torques_mnm += [5.7, 7.0, 8.0, 9.3, 7.4, 7.0, 7.9, 6.4, 9.7, 7.7, 8.0, 5.6, 7.7, 10.0, 7.2, -1.8, -2.6]
+    stride = stride_of(speeds, [each / gain / 1e3 for each in torques_mnm])
+    assert (stride.gain_beyond(FACTOR_OF_THREE) is not None) == is_wrong
