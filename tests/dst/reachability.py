@@ -97,8 +97,11 @@ class Reachability:
         return self._period_s + (MOST_DELAY_S if late else 0.0) + (LONGEST_LAG_S if hastened else 0.0)
 
     def is_foreign(self, index: int) -> bool:
-        """Return whether another program commands the drive's torque."""
-        return self._recently(self._foreign_s[index], AFTERMATH_S)
+        """Return whether another program commands the drive's torque.
+
+        Where the loop sends none, because the drive reports an error, its last torque stays until the drive's watchdog.
+        """
+        return self._recently(self._foreign_s[index], WATCHDOG_S + AFTERMATH_S)
 
     def is_energised_by_others(self, index: int) -> bool:
         return self._recently(self._foreign_s[index], HEARTBEATS_S + REPEAT_S)

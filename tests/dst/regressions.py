@@ -196,6 +196,21 @@ REGRESSIONS = (
         ),
     ),
     Regression(
+        "the torque of another program was counted as ours where it had armed a drive that reports an error",
+        Scenario(
+            seed=9660631,
+            surroundings=Surroundings(seed=0, drive_type="moteus"),
+            start="idle",
+            events=(
+                Failure(at_s=0.109, component="right_sweep.error", kind="stuck", for_s=0.138),
+                Failure(
+                    at_s=0.138, component="right_sweep.master", kind="after every second command, unheard", for_s=0.013
+                ),
+            ),
+            for_s=0.297,
+        ),
+    ),
+    Regression(
         "after a stall within a tick, in which nothing was sent, the gate refused the first torque as too large a step",
         Scenario(
             seed=7310363,
