@@ -192,21 +192,24 @@ class LeaseHeld(Promise):
 class SilentLoop(Promise):
     """No motor drives its joint any longer than its watchdog lasts once no command can reach it, as with SIGSTOP.
 
-    A drive may brake on: a moteus whose watchdog has expired damps. One that others armed is commanded zero, which its
-    protocol may round to half a code.
+    A drive may brake on: a moteus whose watchdog has expired damps. A current that lags decays from then on. A drive
+    that others armed is commanded zero, which its protocol may round to half a code.
     """
 
     LONGEST_S = WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
+    LAGS = 14.0  # time constants in which the largest torque decays to ROUNDING_NM: ln(1e6)
 
     def measure(self, dt_s: float, torques_nm: Torques) -> None:
         robot = self.mechanics
-        if robot.now_s - self.robot.heard_s < self.LONGEST_S:
+        silent_s = robot.now_s - self.robot.heard_s
+        if silent_s < self.LONGEST_S:
             return
         velocities_rad_s = robot.plant.velocities_rad_s
         for index, torque_nm in enumerate(torques_nm):
             rounded_nm = self.reach.half_codes_nm[index] if self.reach.is_energised_by_others(index) else 0.0
             least_nm = self.reach.cogging_nm + ROUNDING_NM + rounded_nm
-            drives = abs(torque_nm) > least_nm and torque_nm * velocities_rad_s[index] > 0.0
+            decays = silent_s < self.LONGEST_S + self.LAGS * robot.drives[index].parameters.current_lag_s
+            drives = abs(torque_nm) > least_nm and torque_nm * velocities_rad_s[index] > 0.0 and not decays
             if drives and not self.reach.is_foreign(index):
                 self.broken.append(f"{JOINTS[index]} is driven with {torque_nm:.3f} N·m although the loop is silent")
 

@@ -211,6 +211,19 @@ REGRESSIONS = (
         ),
     ),
     Regression(
+        "a lagging current that decays after the watchdog was counted as driven",
+        Scenario(
+            seed=9661141,
+            surroundings=Surroundings(seed=603821, drive_type="moteus"),
+            start="extraction",
+            events=(
+                Suspend(at_s=0.17, for_s=0.174, inside="recorder.put"),
+                Failure(at_s=0.17, component="right_sweep.current", kind="lagging", for_s=0.147),
+            ),
+            for_s=0.65,
+        ),
+    ),
+    Regression(
         "after a stall within a tick, in which nothing was sent, the gate refused the first torque as too large a step",
         Scenario(
             seed=7310363,
