@@ -1,9 +1,10 @@
 """Writes a log as Parquet files: one for the ticks, one for the strides, one for the events.
 
 Unit and meaning of a column are metadata of its field (`unit`, `meaning`); the log's metadata and its configuration are
-metadata of the file. This module needs the extra `data`.
+metadata of the file, which also tells pandas that `time` is the index. This module needs the extra `data`.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,19 @@ from logs.files.whole_files import whole_files
 from logs.flat_columns import Column, flat_columns, stack_rows
 
 ROWS_PER_GROUP = 1 << 14  # of a table: six megabytes of ticks, of which the writer needs several copies
+TIME_INDEX = {  # as pandas writes it: https://pandas.pydata.org/docs/development/developer.html
+    "index_columns": ["time"],
+    "column_indexes": [],
+    "columns": [
+        {
+            "name": "time",
+            "field_name": "time",
+            "pandas_type": "datetimetz",
+            "numpy_type": "datetime64[ns]",
+            "metadata": {"timezone": "UTC"},
+        }
+    ],
+}
 
 
 def write_parquet(log: AnyLog, folder: Path, stem: str, watch: Watch = unwatched) -> list[Path]:
@@ -47,6 +61,8 @@ def _arrow_table(columns: list[Column], metadata: dict[str, str]) -> pa.Table:
         pa.field(column.name, array.type, metadata={"unit": column.unit, "meaning": column.meaning})
         for column, array in zip(columns, arrays, strict=True)
     ]
+    if any(column.name == "time" for column in columns):  # the offset of both clocks is known
+        metadata = metadata | {"pandas": json.dumps(TIME_INDEX)}
     return pa.table(arrays, schema=pa.schema(fields, metadata=metadata))
 
 

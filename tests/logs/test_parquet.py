@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from pandas import DatetimeIndex, read_parquet
 
 from control.modes import Mode
 from control.records import FLIPPERS, JOINTS, Phase
@@ -59,8 +60,11 @@ def test_every_row_has_universal_time(log: Log, tmp_path: Path) -> None:
         assert str(table.schema.field("time").type) == "timestamp[ns, tz=UTC]"
         times_ns = table["time"].cast("int64").to_numpy()
         assert times_ns.tolist() == [offset_ns + round(stamp_s * 1e9) for stamp_s in table["stamp_s"].to_pylist()]
+        index = read_parquet(path).index
+        assert isinstance(index, DatetimeIndex) and index.name == "time" and str(index.tz) == "UTC"
     unknown = log._replace(metadata={"wall_minus_monotonic_ns": "-1e9"})
-    assert "time" not in pq.read_schema(write_parquet(unknown, tmp_path, "walk")[0]).names
+    path = write_parquet(unknown, tmp_path, "walk")[0]
+    assert "time" not in pq.read_schema(path).names and read_parquet(path).index.name is None
 
 
 def test_columns_say_their_units_and_the_file_its_origin(log: Log, tmp_path: Path) -> None:
