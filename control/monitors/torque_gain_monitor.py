@@ -143,11 +143,11 @@ class JointStrokes:
 
     def end_stroke(self) -> None:
         blocks, joins = self._stroke, self._joins
-        if len(blocks) >= 2 * joins:
+        if len(blocks) > joins:
             crossed = blocks[:-joins] if joins > 1 else blocks  # in the last ones a rotor may still be in its play
             rows = zip(*[iter(crossed)] * joins, strict=False)
             joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
-            self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined)))
+            self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined) if joined else Moments()))
         blocks.clear()
 
     def end_stride(self) -> Stride:

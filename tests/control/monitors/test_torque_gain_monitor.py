@@ -72,3 +72,8 @@ def test_a_rotor_that_brakes_alone_at_the_end_of_a_swing_is_no_strong_motor(gain
     torques_mnm += [5.7, 7.0, 8.0, 9.3, 7.4, 7.0, 7.9, 6.4, 9.7, 7.7, 8.0, 5.6, 7.7, 10.0, 7.2, -1.8, -2.6]
     stride = stride_of(speeds, [each / gain / 1e3 for each in torques_mnm])
     assert (stride.gain_beyond(FACTOR_OF_THREE) is not None) == is_wrong
+
+
+def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only() -> None:
+    stride = stride_of([1.0, 1.2, 1.4, 1.6, 1.8, 2.0], [0.01] * 5)
+    assert (stride.blocks.blocks, stride.joined.blocks) == (5, 0)
