@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
-LINK = "usr/local/bin/mudskipper"
+LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
 SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
 SYSUSERS = "etc/sysusers.d/mudskipper.conf"
@@ -118,7 +118,8 @@ def plan_installation(system: System, folder: Path | None = None) -> Plan:
     plan = Plan([], [])
     for path, text in sources.items():
         _plan_file(plan, system.root / path, text, before.get(path))
-    _plan_link(plan, system)
+    for link in LINKS:
+        _plan_link(plan, system, link)
     changed = {path for path in after if before.get(path) != after[path]}
     plan.steps.extend(_commands(system, changed))
     if before != after:
@@ -142,14 +143,18 @@ def _plan_file(plan: Plan, path: Path, text: str, before: str | None) -> None:
             plan.steps.append(WriteFile(newer, text))
 
 
-def _plan_link(plan: Plan, system: System) -> None:
-    path, target = system.root / LINK, system.prefix / "bin" / "mudskipper"
+def _plan_link(plan: Plan, system: System, link: str) -> None:
+    path, target = system.root / link, _target(system, link)
     if path.is_symlink() and path.readlink() == target:
         return
     if path.exists() and not path.is_symlink():
         plan.notes.append(f"{path} belongs to other software and stays")
     else:
         plan.steps.append(MakeLink(path, target))
+
+
+def _target(system: System, link: str) -> Path:
+    return system.prefix / "bin" / Path(link).name
 
 
 def _commands(system: System, changed: set[str]) -> Iterator[Step]:
@@ -182,9 +187,9 @@ def plan_removal(system: System, purge: bool) -> Plan:
         plan.steps.append(system.command("systemctl", "disable", *now, SERVICE))
     for path, text in load_sources(system.prefix).items():
         _plan_removal_of(plan, root / path, {_digest(text), before.get(path)}, purge)
-    link = root / LINK
-    if link.is_symlink() and link.readlink() == system.prefix / "bin" / "mudskipper":
-        plan.steps.append(Remove(link))
+    for link in LINKS:
+        if (root / link).is_symlink() and (root / link).readlink() == _target(system, link):
+            plan.steps.append(Remove(root / link))
     removed = {step.path for step in plan.steps if isinstance(step, Remove)}
     for path, command in ((UNIT, ("systemctl", "daemon-reload")), (NETWORK, ("networkctl", "reload"))):
         if system.live and root / path in removed:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from command_line.install import installation, service_plan
 from command_line.install.installation import StepError, install, location_problem, perform, run_command, uninstall
 from command_line.install.service_plan import (
     CONFIGURATION,
-    LINK,
+    LINKS,
     MANIFEST,
     NETWORK,
     SOURCES,
@@ -113,7 +114,8 @@ def test_all_files_are_written_readable_for_every_user_and_the_service_is_enable
         assert (machine.root / location).parent.stat().st_mode & 0o777 == 0o755
     assert machine.text(NETWORK) == (service_plan.source_folder() / "80-can.network").read_text(encoding="utf-8")
     assert "mudskipper" in machine.enabled
-    assert (machine.root / LINK).is_symlink()
+    targets = [(machine.root / link).readlink() for link in LINKS]
+    assert targets == [Path(sys.prefix) / "bin" / name for name in ("mudskipper", "mudskipperd")]
 
 
 def test_where_there_is_no_working_tree_the_files_come_from_the_environment(
@@ -135,7 +137,7 @@ def test_the_second_time_there_is_nothing_to_do(machine: Machine, capsys: pytest
 def test_a_dry_run_shows_everything_and_does_nothing(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
     assert machine.install(dry_run=True) == exit_codes.OK
     shown = capsys.readouterr().out
-    assert all(str(machine.root / location) in shown for location in (*SOURCES, LINK, MANIFEST))
+    assert all(str(machine.root / location) in shown for location in (*SOURCES, *LINKS, MANIFEST))
     assert "run systemd-sysusers" in shown
     assert (machine.files(), machine.ran) == ({}, [])
 
@@ -193,7 +195,7 @@ def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(
     machine.failing = "systemd-sysusers"
     assert machine.install() == exit_codes.UNHEALTHY
     said = capsys.readouterr().err
-    assert "systemd-sysusers" in said and "Failed to connect to bus" in said and "8 of 13" in said
+    assert "systemd-sysusers" in said and "Failed to connect to bus" in said and "9 of 14" in said
     machine.failing = ""
     assert machine.install() == exit_codes.OK
     assert "systemd-sysusers" in machine.ran
@@ -247,7 +249,7 @@ def test_uninstall_keeps_configuration_and_logs_and_forgets_the_rest(machine: Ma
     assert left[CONFIGURATION] == edited
     assert set(json.loads(left[MANIFEST])) == {CONFIGURATION}
     assert "mudskipper" not in machine.enabled
-    assert not (machine.root / LINK).is_symlink()
+    assert not any((machine.root / link).is_symlink() for link in LINKS)
     machine.install()
     assert machine.text(CONFIGURATION) == edited and not (machine.root / f"{CONFIGURATION}.new").exists()
 
@@ -278,15 +280,16 @@ def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None
 
 
 def test_files_that_were_there_before_stay(machine: Machine) -> None:
-    for path in (CONFIGURATION, UNIT, LINK):
+    other = LINKS[0]
+    for path in (CONFIGURATION, UNIT, other):
         (machine.root / path).parent.mkdir(parents=True, exist_ok=True)
     (machine.root / CONFIGURATION).write_text("[robot]\n", encoding="utf-8")
-    (machine.root / LINK).write_text("#!/bin/sh\n", encoding="utf-8")
+    (machine.root / other).write_text("#!/bin/sh\n", encoding="utf-8")
     (machine.root / UNIT).symlink_to("/dev/null")  # a masked unit
     machine.install()
     assert machine.text(CONFIGURATION) == "[robot]\n" and (machine.root / UNIT).readlink() == Path("/dev/null")
     machine.uninstall(purge=True)
-    assert machine.text(LINK) == "#!/bin/sh\n"
+    assert machine.text(other) == "#!/bin/sh\n"
 
 
 @pytest.mark.parametrize("step", [Command(("/nothing",)), Command(("false",)), WriteFile(Path("/dev/null/x"), "")])
