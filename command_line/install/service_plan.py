@@ -20,6 +20,7 @@ DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
 LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
+VIEWERS = "mudskipper-view"  # the group of SYSUSERS
 SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
 SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"
@@ -196,9 +197,10 @@ def plan_removal(system: System, purge: bool) -> Plan:
             plan.steps.append(Command(command))
     if purge:
         plan.steps.extend(Remove(root / path) for path in OWNED if (root / path).exists())
-        users = {line.partition(":")[0] for line in _text_of(root / "etc/passwd").splitlines()}
-        if system.live and SERVICE in users:
-            plan.steps.append(Command(("userdel", SERVICE)))
+        for program, name, file in (("groupdel", VIEWERS, "etc/group"), ("userdel", SERVICE, "etc/passwd")):
+            names = {line.partition(":")[0] for line in _text_of(root / file).splitlines()}
+            if system.live and name in names:
+                plan.steps.append(Command((program, name)))
     else:
         _plan_manifest(plan, root, removed, before)
     return plan

@@ -263,12 +263,13 @@ def test_uninstall_leaves_a_network_file_that_was_edited_and_purge_does_not(mach
     assert machine.files() == {}
 
 
-def test_a_purge_stops_the_service_first_and_removes_the_user_last(machine: Machine) -> None:
+def test_a_purge_stops_the_service_first_and_removes_group_and_user_last(machine: Machine) -> None:
     machine.install()
     (machine.root / "etc/passwd").write_text("root:x:0:0::/root:/bin/sh\nmudskipper:x:990:990::/:\n", encoding="utf-8")
+    (machine.root / "etc/group").write_text("mudskipper-view:x:991:ada\nmudskipper:x:990:\n", encoding="utf-8")
     steps = plan_removal(machine.system(), purge=True).steps
     assert str(steps[0]) == "run systemctl disable --now mudskipper"
-    assert str(steps[-1]) == "run userdel mudskipper"
+    assert [str(step) for step in steps[-2:]] == ["run groupdel mudskipper-view", "run userdel mudskipper"]
     assert Remove(machine.root / "etc/mudskipper") in steps
 
 
