@@ -25,8 +25,8 @@ thrown through that play, so no block counts that is faster than any path. One s
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
-counts only after a swing whose motion its torques explain. An extraction's end is not used, nor an adduction joint that
-catches up in a swing: the pull of mud that lets go falls with the acceleration.
+counts only after a swing of the same walk whose motion its torques explain. An extraction's end is not used, nor an
+adduction joint that catches up in a swing: the pull of mud that lets go falls with the acceleration.
 """
 
 from collections import deque
@@ -215,6 +215,8 @@ class FlipperStrokes:
         """Add the faults of the phase that ends. After a gap in a phase only the stroke ends."""
         joint, self._joint = self._joint, self._joint_of.get(phase)
         self._watched = self._first if self._joint is self._sweep else self._first + 1
+        if phase is Phase.REST:  # the body may sink before the next walk
+            self._swung_in_air = False
         if joint is None:
             return
         joint.end_stroke()
@@ -222,7 +224,7 @@ class FlipperStrokes:
             return
         stride = joint.end_stride()
         fault = joint.fault_of(stride) if joint is self._sweep or self._swung_in_air else None
-        if joint is self._sweep:
+        if joint is self._sweep and phase is not Phase.REST:
             self._swung_in_air = stride.blocks.in_air
         if fault:
             found.append(fault)

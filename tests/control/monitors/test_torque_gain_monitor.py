@@ -1,19 +1,26 @@
 """Moments of torque and motion show a wrong gain only where the torque varied and the motion follows it."""
 
+from math import sin
+
 import pytest
 
+from control.faults import Fault
+from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION
 from control.monitors.torque_gain_monitor import (
     BLOCK_TICKS,
     FACTOR_OF_ONE,
     FACTOR_OF_THREE,
     JOINED_BLOCKS,
+    FlipperStrokes,
     JointStrokes,
     Moments,
     Stride,
+    TorqueGainMonitor,
 )
+from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
-from control.records import DriveState
+from control.records import DriveState, Joints, Phase
 
 INERTIA_KG_M2 = 0.0004
 
@@ -77,3 +84,25 @@ def test_a_rotor_that_brakes_alone_at_the_end_of_a_swing_is_no_strong_motor(gain
 def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only() -> None:
     stride = stride_of([1.0, 1.2, 1.4, 1.6, 1.8, 2.0], [0.01] * 5)
     assert (stride.blocks.blocks, stride.joined.blocks) == (5, 0)
+
+
+@pytest.mark.parametrize("begins_anew", [False, True])
+def test_the_first_insertion_of_a_walk_may_be_in_mud_into_which_the_body_has_sunk(begins_anew: bool) -> None:
+    """The swing of the walk before was in air. By its angles the flipper is in air now too, by its torque it is not."""
+    weightless = ArmMass(arm_mass_kg=0.0, sweep_inertia_kg_m2=INERTIA_KG_M2, adduction_inertia_kg_m2=INERTIA_KG_M2)
+    frictions = (NO_FRICTION, NO_FRICTION)
+    flipper = FlipperStrokes(0, ("left_sweep", "left_adduction"), FlipperGeometry(), weightless, frictions, asked=False)
+    monitor, found, stamp_s, speed_rad_s = TorqueGainMonitor([flipper]), list[Fault](), 1.0, 1.0
+    rest = [Phase.REST] if begins_anew else []
+    for phase, gain in [
+        (Phase.SWING, 1.0),
+        *((each, 1.0) for each in rest),
+        (Phase.INSERTION, 0.2),
+        (Phase.STANCE, 1.0),
+    ]:
+        for tick in range(40):
+            torque_nm = 0.02 * sin(tick / 6.0)
+            stamp_s, speed_rad_s = stamp_s + PERIOD_S, speed_rad_s + gain * torque_nm / INERTIA_KG_M2 * PERIOD_S
+            state = DriveState(0.5, speed_rad_s, stamp_s)
+            monitor.update(found, True, Joints(state, state), Joints(torque_nm, torque_nm), phase)
+    assert bool(found) != begins_anew
