@@ -19,9 +19,10 @@ A motor is too strong if the lower bound is, and too weak if the upper one is. W
 SAME_FRACTION, the strokes had too little acceleration for a verdict. A rotor with the encoder that crosses the play of
 a belt moves alone, up to three times as easily as its joint, and then hits it: after both, the torque has moved the
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
-cross 1 degree, and without the last three of a stroke, which may end before the hit. A sweep that the mud lets go of is
-thrown through that play, so no block counts that is faster than any path. One stride proves a gain beyond a factor of
-2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+cross 1 degree, and without the last three of a stroke, which may end before the hit. What is left may vary too little
+to show a gain, so the single blocks must agree. A sweep that the mud lets go of is thrown through that play, so no
+block counts that is faster than any path. One stride proves a gain beyond a factor of 2, three strides together one
+beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -104,7 +105,7 @@ class Stride(NamedTuple):
     def gain_beyond(self, factor: float) -> float | None:
         """Return the gain, if it is certainly beyond this factor or its inverse."""
         blocks, joined = self
-        if joined.is_line and joined.um > factor * joined.uu:
+        if joined.is_line and joined.um > factor * joined.uu and blocks.um > factor * blocks.uu:
             return joined.gain
         return blocks.gain if blocks.is_line and factor * blocks.mm < blocks.um else None
 
