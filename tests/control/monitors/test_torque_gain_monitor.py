@@ -81,28 +81,38 @@ def test_a_rotor_that_brakes_alone_at_the_end_of_a_swing_is_no_strong_motor(gain
     assert (stride.gain_beyond(FACTOR_OF_THREE) is not None) == is_wrong
 
 
+def test_a_line_through_joined_blocks_that_hardly_vary_is_chance() -> None:
+    """Bounds of a simulated swing without play: 1.24 and 1.29 from single blocks, 2.03 and 2.80 from joined ones."""
+    blocks = Moments(blocks=73, uu=1e-3, um=1.24e-3, mm=1.6e-3)
+    joined = Moments(blocks=23, uu=1e-5, um=2.03e-5, mm=5.68e-5)
+    assert joined.is_line and Stride(blocks, joined).gain_beyond(FACTOR_OF_ONE) is None
+
+
 def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only() -> None:
     stride = stride_of([1.0, 1.2, 1.4, 1.6, 1.8, 2.0], [0.01] * 5)
     assert (stride.blocks.blocks, stride.joined.blocks) == (5, 0)
 
 
-@pytest.mark.parametrize("begins_anew", [False, True])
-def test_the_first_insertion_of_a_walk_may_be_in_mud_into_which_the_body_has_sunk(begins_anew: bool) -> None:
+@pytest.mark.parametrize(
+    ("before", "counts"),
+    [
+        ((Phase.SWING, Phase.PAUSE), True),
+        ((Phase.SWING, Phase.REST), False),
+        ((Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.REST), False),
+    ],
+)
+def test_the_first_insertion_of_a_walk_may_be_in_mud_into_which_the_body_has_sunk(
+    before: tuple[Phase, ...], counts: bool
+) -> None:
     """The swing of the walk before was in air. By its angles the flipper is in air now too, by its torque it is not."""
     weightless = ArmMass(arm_mass_kg=0.0, sweep_inertia_kg_m2=INERTIA_KG_M2, adduction_inertia_kg_m2=INERTIA_KG_M2)
     frictions = (NO_FRICTION, NO_FRICTION)
     flipper = FlipperStrokes(0, ("left_sweep", "left_adduction"), FlipperGeometry(), weightless, frictions, asked=False)
     monitor, found, stamp_s, speed_rad_s = TorqueGainMonitor([flipper]), list[Fault](), 1.0, 1.0
-    rest = [Phase.REST] if begins_anew else []
-    for phase, gain in [
-        (Phase.SWING, 1.0),
-        *((each, 1.0) for each in rest),
-        (Phase.INSERTION, 0.2),
-        (Phase.STANCE, 1.0),
-    ]:
+    for phase, gain in (*((each, 1.0) for each in before), (Phase.INSERTION, 0.2), (Phase.STANCE, 1.0)):
         for tick in range(40):
             torque_nm = 0.02 * sin(tick / 6.0)
             stamp_s, speed_rad_s = stamp_s + PERIOD_S, speed_rad_s + gain * torque_nm / INERTIA_KG_M2 * PERIOD_S
             state = DriveState(0.5, speed_rad_s, stamp_s)
             monitor.update(found, True, Joints(state, state), Joints(torque_nm, torque_nm), phase)
-    assert bool(found) != begins_anew
+    assert bool(found) == counts
