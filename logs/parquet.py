@@ -1,7 +1,7 @@
 """Writes a log as Parquet files: one for the ticks, one for the strides, one for the events.
 
 Unit and meaning of a column are metadata of its field (`unit`, `meaning`); the log's metadata and its configuration are
-metadata of the file, which also tells pandas that `time` is the index. This module needs the extra `data`.
+metadata of the file, by which pandas makes `time` the index. This module needs the extra `data`.
 """
 
 import json

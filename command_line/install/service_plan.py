@@ -16,11 +16,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
+from firmware_host.sockets.user_groups import VIEWERS
+
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
 LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
-VIEWERS = "mudskipper-view"  # the group of SYSUSERS
 SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
 SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"

@@ -225,8 +225,8 @@ class FlipperStrokes:
             return
         stride = joint.end_stride()
         fault = joint.fault_of(stride) if joint is self._sweep or self._swung_in_air else None
-        if joint is self._sweep and phase is not Phase.REST:
-            self._swung_in_air = stride.blocks.in_air
+        if joint is self._sweep:
+            self._swung_in_air = stride.blocks.in_air and phase is not Phase.REST
         if fault:
             found.append(fault)
 
