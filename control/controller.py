@@ -164,7 +164,7 @@ class Controller:
     def move(self, angles: Sequence[float | None], speed_rad_s: float = inf) -> None:
         """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle.
 
-        They never move faster than configured.
+        The speed is the mean one of the joint with the longest way, and never above the configured one.
         """
         held_rad = self._held_rad
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held_rad, strict=True)))

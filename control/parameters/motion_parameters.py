@@ -11,7 +11,7 @@ class MotionParameters:
     """Parameters of motions outside the gait."""
 
     path_speed_rad_s: Annotated[
-        float, Bounds(0.05, 10.0), Meaning("of joints that move to a pose outside of the gait")
+        float, Bounds(0.05, 10.0), Meaning("mean speed of the joint with the longest way to a pose outside of the gait")
     ] = 1.0
     fade_in_s: Annotated[
         float, Bounds(0.0, 10.0), Meaning("in which stiffness rises to its full value after arming")

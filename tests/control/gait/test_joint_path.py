@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from control.gait.joint_path import SHORTEST_LEG_S, JointPath, still
@@ -56,6 +56,7 @@ def test_way_points_are_passed_one_after_the_other() -> None:
 
 
 @given(poses, poses, speeds, st.floats(-1.0, 1.0))
+@example(Joints(0.0, 0.625, 0.0, 0.0), Joints(0.0, 1.125, 0.0, 0.0), 5.0, -1.0)
 def test_joints_that_move_go_on_without_a_jump_and_still_end_at_rest(
     start: JointAngles, end: JointAngles, speed: float, fraction: float
 ) -> None:
@@ -65,7 +66,8 @@ def test_joints_that_move_go_on_without_a_jump_and_still_end_at_rest(
     assert [target.velocity_rad_s for target in steps[0]] == pytest.approx(begun_rad_s, abs=0.2 * speed)
     for before, after in pairwise(steps):
         for here, there in zip(before, after, strict=True):
-            assert abs(there.velocity_rad_s) <= 2.0 * speed * (1.0 + 1e-9)
+            # of a leg of two ramps that begins at full speed backwards: the largest 1 - cos(2 π s) + (1 - s) (3 s - 1)
+            assert abs(there.velocity_rad_s) <= 2.2611 * speed
             mean_rad_s = (here.velocity_rad_s + there.velocity_rad_s) / 2.0
             assert (there.angle_rad - here.angle_rad) / PERIOD_S == pytest.approx(mean_rad_s, abs=0.2 * speed)
 
