@@ -233,10 +233,11 @@ class _Reader:
 
 
 def replied_values(subframes: Iterable[Subframe]) -> dict[int, float]:
-    """Return the values of all replies by register."""
+    """Return the values of all replies by register; one that the drive does not know is left out."""
     return {
         each.register + index: value
         for each in subframes
         if each.kind == REPLY
         for index, value in enumerate(each.values)
+        if isfinite(value)
     }

@@ -12,13 +12,14 @@ from control.records import JOINTS, DriveStates, Joints
 from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveHealth
 from drivers.drive_types import make_drives
-from drivers.moteus import codec
+from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode
 from drivers.moteus.parameters import MoteusParameters
+from drivers.moteus.registers import Register, Resolution
 from drivers.odrive.drive_type import Odrive
 from simulation.devices.drive import DriveError, SimulatedDriveParameters
 from simulation.devices.moteus.device import SimulatedMoteus
-from simulation.devices.moteus.forgeries import command_frame
+from simulation.devices.moteus.forgeries import answer_frame, command_frame
 
 NO_TORQUE = Joints(0.0, 0.0, 0.0, 0.0)
 
@@ -227,6 +228,15 @@ def test_a_signal_that_a_drive_does_not_know_keeps_its_old_stamp() -> None:
         assert isfinite(state.angle_rad + state.current_a)
         bench.tick()
         before = bench.tick()[0]
+
+
+@pytest.mark.parametrize("register", [Register.REGISTER_MAP, Register.SERIAL_NUMBER])
+def test_a_setting_that_a_drive_does_not_know_stays_unknown(register: Register) -> None:
+    bench = Bench()
+    data = registers.encode_values(registers.REPLY, Resolution.INT32, register, [nan, nan, nan])
+    bench.far.send(answer_frame(1, registers.padded(data)))
+    bench.tick()
+    assert (bench.health.firmware, bench.health.serial_number) == ("", "")
 
 
 def test_a_motor_without_thermistor_has_no_temperature() -> None:
