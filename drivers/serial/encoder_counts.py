@@ -42,7 +42,7 @@ class EncoderCounts:
             self._rejected_m = UNKNOWN if position_m is None else position_m
             return None
         self.accepted += 1
-        self._position_m, self._stamp_s = position_m, stamp_s
+        self._position_m, self._rejected_m, self._stamp_s = position_m, UNKNOWN, stamp_s
         return position_m
 
     def _is_plausible(self, position_m: float, stamp_s: float) -> bool:

@@ -30,3 +30,10 @@ def test_a_jump_is_accepted_once_it_stays_and_is_counted() -> None:
     reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
     assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
     assert (counts.malformed, counts.jumps) == (2, 1)
+
+
+def test_a_spike_is_rejected_again_where_counts_came_in_between() -> None:
+    counts = EncoderCounts(1e-5)
+    reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"0", b"50010", b"0", b"50020"])]
+    assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(0.5002)]
+    assert (counts.malformed, counts.jumps) == (2, 0)
