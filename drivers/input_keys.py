@@ -23,7 +23,7 @@ class InputKeys:
         keys, axes = (has.get(kind, []) for kind in (evdev.ecodes.EV_KEY, evdev.ecodes.EV_ABS))
         self.keys = {name: numbers[name] for name in names if numbers.get(name) in keys}
         self._axes = {
-            name: numbers[name[:-1]] for name in names if name.startswith("ABS") and numbers[name[:-1]] in axes
+            name: numbers[name[:-1]] for name in names if name.startswith("ABS") and numbers.get(name[:-1]) in axes
         }
 
     def pressed(self) -> set[str]:

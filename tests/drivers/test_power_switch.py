@@ -108,6 +108,7 @@ def test_a_pressed_key_is_a_cut(monkeypatch: pytest.MonkeyPatch, key: str, cut: 
         ("key", "KEY_A", None, "mudskipper[inputs]"),
         ("key", "KEY_NONE", Evdev(), "KEY_NONE"),
         ("key", "KEY_B", Evdev(), "no such key"),
+        ("key", "ABS_HAT0Y", Evdev(), "no such key"),  # an axis, and no direction of one
         ("gpio", "", FileNotFoundError(2, "No such file"), "does not open: No such file"),
         ("gpio", "", ValueError(22, "Invalid argument"), "does not open: Invalid argument"),  # by gpiod: no such line
         ("gpio", "", NotImplementedError(95, "not supported"), "does not open: not supported"),  # no pull-up
