@@ -63,7 +63,9 @@ def setup(
                 path = backup or default_path()
                 write_backup(path, [each for each in setups if each.joint in changes], changes)
                 print(f"the old settings are in {path}")
-                return _write(setups, changes, Names())
+                if status := _write(setups, changes, Names()):
+                    return status
+                setups = [each._replace(values={**each.values, **each.wanted}) for each in setups]
             return _summary(setups, write)
     except NoAnswerError as problem:
         raise CommandError(str(problem)) from None
@@ -116,12 +118,14 @@ def _summary(setups: Sequence[JointSetup], written: bool) -> int:
 
 
 def _restoring(setups: Sequence[JointSetup], backups: Mapping[str, Backup]) -> Changes:
-    """Return the old values. Raises CommandError where a file is of another drive."""
+    """Return the old values. Raises CommandError where a file is of another drive, or a value cannot be read."""
     for each in setups:
         backup, found = backups[each.joint], each.found
         if (backup.type, backup.serial_number) != (found.type, found.serial_number):
             text = f"{each.joint}: the file is of a drive of type {backup.type} with serial number"
             raise CommandError(f"{text} {backup.serial_number or '-'}, not {found.serial_number or '-'}")
+        for key in backup.old.keys() - each.values.keys():
+            raise CommandError(f"{each.joint}: {key}: {each.unreadable.get(key, 'this drive has no such setting')}")
         print(f"{each.joint} {backup.state(each.values)}")
     return {each.joint: backups[each.joint].old for each in setups}
 

@@ -108,6 +108,23 @@ def test_a_drive_of_another_protocol_is_refused(folder: Path, monkeypatch: pytes
     assert all(frame.is_remote for frame in bench.buses["left"].sent)
 
 
+def test_the_exit_status_says_what_still_differs_after_writing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`motor.Kv` is never written."""
+    bench = Bench(folder, "moteus", monkeypatch, torque_constant_nm_a=0.1)
+    ended = run("drives", "setup", "--config", str(bench.config), "--write", "--backup", "old.toml")
+    assert ended.stdout.count("it has the new settings") == 4 and "4 settings differ, 0 were not read" in ended.stdout
+    assert ended.returncode == exit_codes.UNHEALTHY
+
+
+def test_what_cannot_be_read_is_not_restored(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make_bench(folder, monkeypatch, "odrive")
+    config = ("--config", str(bench.config))
+    run("drives", "setup", *config, "--write", "--backup", "old.toml")
+    (folder / "flat_endpoints.json").unlink()
+    ended = run("drives", "setup", *config, "--restore", "old.toml")
+    assert ended.returncode == exit_codes.UNHEALTHY and "name the flat_endpoints.json of firmware" in ended.stderr
+
+
 def test_a_file_of_another_drive_is_not_restored(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench(folder, monkeypatch, "odrive")
     config = ("--config", str(bench.config))
