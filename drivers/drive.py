@@ -66,7 +66,7 @@ class DriveParameters:
 
     @property
     def reports_settings(self) -> bool:
-        """Return whether its protocol can read the drive's watchdog, version and serial number back."""
+        """Return whether this program comes to know the drive's watchdog and version by itself."""
         return True
 
     @property

@@ -3,7 +3,7 @@
 The lock is a Unix socket with an abstract name that is made of role, interface and channel. The kernel frees the name
 when its owner dies in any way, every user and a service with a private /tmp or a read-only disk see the same names, and
 like CAN interfaces they belong to one network namespace. No file remains, and no folder needs permissions. A
-program on another computer of the bus is detected by its commands: see drivers/odrive/axis.py.
+program on another computer of the bus is detected by its commands: see drivers/drive_axis.py.
 """
 
 import errno

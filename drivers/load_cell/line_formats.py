@@ -99,7 +99,7 @@ def printable(line: bytes) -> str | None:
 
 
 def find_format(lines: Sequence[bytes]) -> LineFormat | None:
-    """Return the named format that decodes most of these lines, at least half; None where neither does.
+    """Return the named format that decodes most of these lines, more than half; None where neither does.
 
     Columns are never chosen, because only the operator knows which one is the load.
     """
