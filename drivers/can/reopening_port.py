@@ -3,7 +3,7 @@
 A socket or a serial port whose device has vanished stays dead when the device is back. So this port opens its inner
 port again, every RETRY_S while it is off. Opening reads files and may take a second, so it happens between two ticks
 and only while the caller says that nothing moves. A port that was opened again counts as off until a frame has arrived
-on it, because its controller may still be off the bus.
+on it, or the report of another state, because its controller may still be off the bus.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -165,8 +165,8 @@ class CanSimpleAxis(DriveAxis):
         """Set torque mode, limits, velocity gain and zero torque.
 
         In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain without reporting
-        it. Both are set so that the clamp lies above every torque for a joint within its own velocity limit, and
-        removes the torque of a faster joint, even when this program is dead and its last command is still in force.
+        it. As both are by default, the clamp takes at most 3 % of the torque that a joint may have at its speed, and
+        all of it from 4 turns/s on, even when this program is dead and its last command is still in force.
         """
         parameters = self.parameters
         self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)

@@ -15,7 +15,7 @@ class OdriveParameters(DriveParameters):
         float, Bounds(0.1, 200.0), Meaning("of the drive; together with the gain it also limits torque")
     ] = 4.0
     velocity_gain_nm_s_turn: Annotated[
-        float, Bounds(0.01, 20.0), Meaning("with which the drive cuts torque above the velocity limit")
+        float, Bounds(0.01, 20.0), Meaning("with which the drive cuts torque near the velocity limit")
     ] = 0.5
 
     @property

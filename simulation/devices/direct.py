@@ -2,7 +2,7 @@
 
 Motor, encoder, noise and the times of the samples are those of an ODrive with firmware 0.6. What belongs to its wire is
 left out: rounding to binary32, messages that are late or repeated, settings, the watchdog, and the clamp of the
-velocity, which lies above every torque of a joint within its limits.
+velocity, which takes at most 3 % of the torque of a joint within its limits.
 """
 
 from collections.abc import Sequence
