@@ -58,7 +58,7 @@ def reading_of(estimate: Estimate, depth_m: float) -> Reading | None:
     if not ((estimate.valid or estimate.at_least) and DEPTHS_M[0] <= depth_m <= DEPTHS_M[1]):
         return None
     least, most = COEFFICIENTS_N_M3
-    if not (least <= k <= most and 0.0 <= error <= k and estimate.std_error <= most):
+    if not (least <= k <= most and 0.0 <= error <= k and 0.0 <= estimate.std_error <= most):
         return None
     relative = error / k
     return Reading(

@@ -561,7 +561,7 @@ NONSENSE = [
         (1e300, 1.0),
         (5e-324, 5e-324),
     ]
-]
+] + [Estimate(1e6, error, 50, True, repeatability=0.1e6) for error in (nan, inf, -0.2e6, -1e200)]
 numbers = st.floats() | st.floats(1e4, 1e8)
 anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), st.just(""), st.booleans())
 sound = st.builds(reported, st.floats(1e4, 1e8), st.floats(0.0, 0.6)) | st.just(NOT_REPORTED)
