@@ -21,8 +21,9 @@ a belt moves alone, up to three times as easily as its joint, and then hits it: 
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
 cross 1 degree, and without the last three of a stroke, which may end before the hit. What is left may vary too little
 to show a gain, so the single blocks must agree. A sweep that the mud lets go of is thrown through that play, so no
-block counts that is faster than any path. One stride proves a gain beyond a factor of 2, three strides together one
-beyond 1.6. [arm] states the inertias, which must be as exact.
+block counts that is faster than any path. A thrown sweep is braked while mud may still push its flipper, as a weak
+motor would brake it, so the later half of each stroke must show a weak motor by itself. One stride proves a gain beyond
+a factor of 2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -94,20 +95,25 @@ class Moments(NamedTuple):
 
 
 class Stride(NamedTuple):
-    """The moments of a stride's blocks, and of its joined blocks, which a rotor in its play does not change."""
+    """The moments of a stride's blocks, of its joined blocks, which a rotor in its play does not change, and of the
+    later halves of its strokes, which mud that lets go does not change.
+    """
 
     blocks: Moments = Moments()
     joined: Moments = Moments()
+    later: Moments = Moments()
 
     def plus(self, other: "Stride") -> "Stride":
-        return Stride(self.blocks.plus(other.blocks), self.joined.plus(other.joined))
+        blocks, joined, later = self
+        return Stride(blocks.plus(other.blocks), joined.plus(other.joined), later.plus(other.later))
 
     def gain_beyond(self, factor: float) -> float | None:
         """Return the gain, if it is certainly beyond this factor or its inverse."""
-        blocks, joined = self
+        blocks, joined, later = self
         if joined.is_line and joined.um > factor * joined.uu and blocks.um > factor * blocks.uu:
             return joined.gain
-        return blocks.gain if blocks.is_line and factor * blocks.mm < blocks.um else None
+        is_weak = factor * blocks.mm < blocks.um and factor * later.mm < later.um
+        return blocks.gain if blocks.is_line and is_weak else None
 
 
 class JointStrokes:
@@ -148,7 +154,10 @@ class JointStrokes:
             crossed = blocks[:-joins] if joins > 1 else blocks  # in the last ones a rotor may still be in its play
             rows = zip(*[iter(crossed)] * joins, strict=False)
             joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
-            self._stride = self._stride.plus(Stride(Moments.of(blocks), Moments.of(joined) if joined else Moments()))
+            later = blocks[len(blocks) // 2 :] if joins > 1 else blocks  # an insertion in air is short
+            self._stride = self._stride.plus(
+                Stride(Moments.of(blocks), Moments.of(joined) if joined else Moments(), Moments.of(later))
+            )
         blocks.clear()
 
     def end_stride(self) -> Stride:

@@ -44,13 +44,13 @@ def test_a_torque_that_stays_at_its_limit_shows_no_gain(uu: float) -> None:
 
 def test_a_motion_whose_square_underflows_raises_nothing() -> None:
     moments = Moments(blocks=9, uu=1e-6, um=1e-170, mm=1e-320)
-    assert Stride(moments, moments).gain_beyond(FACTOR_OF_ONE) == pytest.approx(0.0)
+    assert Stride(moments, moments, moments).gain_beyond(FACTOR_OF_ONE) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("gain", [0.3, 3.0])
 def test_a_wrong_gain_is_returned(gain: float) -> None:
     moments = Moments(9, 0.1, gain * 0.1, gain * gain * 0.1)
-    assert Stride(moments, moments).gain_beyond(FACTOR_OF_ONE) == pytest.approx(gain)
+    assert Stride(moments, moments, moments).gain_beyond(FACTOR_OF_ONE) == pytest.approx(gain)
 
 
 def test_a_joint_that_the_mud_lets_go_of_shows_no_gain_while_it_is_faster_than_any_path() -> None:
@@ -86,6 +86,40 @@ def test_a_line_through_joined_blocks_that_hardly_vary_is_chance() -> None:
     blocks = Moments(blocks=73, uu=1e-3, um=1.24e-3, mm=1.6e-3)
     joined = Moments(blocks=23, uu=1e-5, um=2.03e-5, mm=5.68e-5)
     assert joined.is_line and Stride(blocks, joined).gain_beyond(FACTOR_OF_ONE) is None
+
+
+@pytest.mark.parametrize(("gain", "is_wrong"), [(1.0, False), (0.4, True)])
+def test_a_thrown_sweep_that_the_mud_still_pushes_while_it_is_braked_is_no_weak_motor(
+    gain: float, is_wrong: bool
+) -> None:
+    """Blocks of a simulated swing of a body that has sunk: torque and motion, mN·m; without most of its plateau."""
+    thrown = [(-168.5, -46.0), (-83.5, -16.1), (-22.8, 13.9), (3.0, 10.6), (16.6, -0.1), (41.2, 3.0), (55.2, 4.1)]
+    plateau = [
+        (63.5, 7.1),
+        (59.6, 10.1),
+        (48.0, -1.4),
+        (50.1, 0.6),
+        (52.0, 2.9),
+        (53.5, 3.6),
+        (54.1, 5.0),
+        (49.0, -0.6),
+    ]
+    braking = [
+        (52.5, 2.6),
+        (52.9, 4.2),
+        (54.8, 5.8),
+        (48.9, -0.7),
+        (49.8, 0.1),
+        (50.2, 0.6),
+        (36.6, -12.2),
+        (29.6, -20.7),
+    ]
+    speed_rad_s, speeds = 5.0, [5.0]
+    for _, motion_mnm in thrown + plateau + braking:
+        speed_rad_s += motion_mnm / 1e3 / INERTIA_KG_M2 * BLOCK_TICKS * PERIOD_S
+        speeds.append(speed_rad_s)
+    stride = stride_of(speeds, [torque_mnm / gain / 1e3 for torque_mnm, _ in thrown + plateau + braking])
+    assert (stride.gain_beyond(FACTOR_OF_ONE) is not None) == is_wrong
 
 
 def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only() -> None:
