@@ -99,7 +99,7 @@ class StrideEstimator(ABC):
         GRACE_S to come out.
         """
         closed = None
-        is_path = phase is Phase.STROKE
+        is_path = phase is Phase.STROKE or (self._is_path and phase is Phase.PAUSE)
         if is_path:
             phase = self._motion.update(self.geometry.depth_m(*self._loads.angles_rad), self._is_in_mud())
         elif self._is_path:

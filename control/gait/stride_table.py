@@ -99,6 +99,8 @@ def stride_table(gait: GaitParameters | GaitPath, geometry: FlipperGeometry, dep
         legs = list(_legs(number, phase, here, geometry, depth_m, ordered))
         here = legs[-1].sweep_end_rad, legs[-1].depth_end_m
         rows += _timed(legs, phase, geometry)
+    if any(row.phase is Phase.STROKE for row in rows):  # one that is not pure makes strokes of all
+        rows = [row if row.phase in (Phase.SWING, Phase.PAUSE) else row._replace(phase=Phase.STROKE) for row in rows]
     return tuple(rows)
 
 

@@ -87,6 +87,17 @@ def test_the_parts_of_a_crutching_stride_are_found_without_their_names() -> None
             assert abs(one.value - other.value) < one.std_error, k
 
 
+def test_a_pause_within_a_path_ends_none_of_its_parts() -> None:
+    moments = walked(gait=GaitParameters(pause_s=0.3), strides=3)
+    named = list(strides_of(moments))
+    found = list(strides_of([m if m.phase is Phase.PAUSE else m._replace(phase=Phase.STROKE) for m in moments]))
+    assert len(found) >= len(named) - 1
+    for by_name, by_motion in zip(named[1:], found[1:], strict=False):
+        for k in ("k_p", "k_s", "k_e"):
+            one, other = getattr(by_name, k), getattr(by_motion, k)
+            assert abs(one.value - other.value) < one.std_error, k
+
+
 def test_a_path_goes_down_up_and_on_in_the_air() -> None:
     motion = PathMotion()
     depths_m = [-0.01, -0.012, -0.011, 0.0, 0.02, 0.0199, 0.019, 0.005, -0.001, -0.002, 0.0]

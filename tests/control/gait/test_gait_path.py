@@ -1,5 +1,6 @@
 """Gaits from files: those that ship against the parameters and the curves that they stand for."""
 
+from dataclasses import replace
 from itertools import islice, pairwise
 from math import radians
 
@@ -9,7 +10,7 @@ from control.gait.gait import Gait
 from control.gait.stride_table import crutching_parameters, stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
-from control.parameters.gait_path import GaitPath
+from control.parameters.gait_path import GaitPath, WayPoint
 from control.rate import PERIOD_S
 from control.records import GaitTarget, Phase
 from estimation.stride_clock import STROKES
@@ -73,6 +74,13 @@ def test_only_pure_phases_in_order_keep_their_names_for_the_estimator() -> None:
     assert reported["backward"] == reported["walking"] == [*STROKES, Phase.SWING]
     assert reported["ellipse"] == [Phase.STROKE, Phase.SWING]
     assert Phase.INSERTION not in reported["slow_insertion"]
+
+
+def test_one_phase_that_is_not_pure_makes_strokes_of_all() -> None:
+    crutching = load("walking")
+    oblique = replace(crutching.phase[0], way_points=(WayPoint(25.0, depth_fraction=1.0),))
+    path = replace(crutching, phase=(oblique, *crutching.phase[1:]))
+    assert [row.phase for row in stride_table(path, GEOMETRY, DEPTH_M)] == [*[Phase.STROKE] * 3, Phase.SWING]
 
 
 @pytest.mark.parametrize(("name", "after_s", "depth_m"), [("slow_insertion", 2.0, 0.05), ("ellipse", 0.2, 0.03)])
