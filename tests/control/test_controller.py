@@ -1,12 +1,13 @@
 """The targets of the controller in each mode, read back through gains that turn torques into targets."""
 
+from dataclasses import replace
 from math import inf, nan, radians
 
 import pytest
 
 from control.controller import DAMPING_NM, DAMPING_S, RAISING_S, RESTING, SETTLED_S, SOFT_STOP_S, Controller, WalkOrder
 from control.gait.recovery import Recovery
-from control.gait.stride_table import stride_duration_s
+from control.gait.stride_table import crutching, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.modes import MOVING, Mode
@@ -154,6 +155,25 @@ def test_a_walk_is_finished_after_the_strides_that_were_ordered_and_without_a_nu
         wanted_pose(endless, Mode.WALKING)
         assert not endless.walk_finished
     assert endless.target.stride >= 2
+
+
+def test_flippers_apart_both_take_the_depths_in_turn() -> None:
+    depths_m = (0.02, 0.04, 0.03)
+    path = replace(crutching(replace(GAIT, swing_duration_s=0.4)), right_offset_fraction=0.5)
+    controller = walking(WalkOrder(depths_m[0], adaptive=False, depths_m=depths_m, gait=path))
+    deepest_m: list[list[float]] = [[], []]
+    while controller.gait.stride < 4:
+        controller.gait.next_depth_m = controller.order.depth_of(controller.gait.stride + 1)  # as at each close
+        pose = wanted_pose(controller, Mode.WALKING)
+        for reached_m, (sweep_rad, lift_rad) in zip(deepest_m, pose.flippers, strict=True):
+            depth_m = GEOMETRY.depth_m(sweep_rad, lift_rad)
+            if depth_m < 0.0:
+                reached_m.append(0.0)
+            else:
+                reached_m[-1] = max(reached_m[-1], depth_m)
+    left_m, right_m = ([depth_m for depth_m in reached_m if depth_m] for reached_m in deepest_m)
+    assert left_m == pytest.approx([*depths_m, depths_m[0]], abs=1e-4)
+    assert right_m[:3] == pytest.approx(depths_m, abs=1e-4)
 
 
 def raise_flippers(controller: Controller) -> list[JointAngles]:
