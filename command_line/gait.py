@@ -19,7 +19,7 @@ from experiments.study.option import Option
 from experiments.study.values import picture
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.gait_checks import gait_problems
+from firmware_host.configuration.gait_checks import depth_problem, gait_problems
 from firmware_host.configuration.gait_file import as_json, gait_document, read_gait
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -48,7 +48,8 @@ def check(
     configuration = _configuration(config)
     path = read_gait(gait_document(gait))
     depth_m = max(path.depths_m, default=configuration.adaptation.initial_depth_m)
-    if problems := list(gait_problems(path, configuration, depth_m)):
+    depths = filter(None, [depth_problem(configuration, each_m) for each_m in path.depths_m])
+    if problems := [*depths, *gait_problems(path, configuration, depth_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
     print("\nthe crutching gait: its depth can adapt to the mud" if crutching_parameters(path) else "\naccepted")

@@ -11,7 +11,7 @@ from math import cos, degrees, hypot, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
-from control.gait.recovery import is_in_mud
+from control.gait.recovery import OUT_M, is_in_mud
 from control.gait.stride_table import PhaseRow, stride_table
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
@@ -23,6 +23,7 @@ from firmware_host.configuration.configuration import Configuration
 POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
 PEAK_FRACTION = 0.5  # of k_e Φ
 EXPECTED_N_M3 = {"k_p": 0.82e6, "k_s": 0.46e6, "k_e": 1.45e6}  # 49.5 % water, docs/results/loadcell.json
+SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 
 
 class Pose(NamedTuple):
@@ -32,6 +33,17 @@ class Pose(NamedTuple):
     depth_m: float
     swept_rad_s: float
     sunk_m_s: float
+
+
+def depth_problem(configuration: Configuration, depth_m: float) -> str:
+    """Return why no stride may be as deep; empty if one may."""
+    deepest_m = configuration.adaptation.max_depth_m
+    if SHALLOWEST_M <= depth_m <= deepest_m:
+        return ""
+    return (
+        f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
+        f" {100.0 * deepest_m:g} cm, which is adaptation.max_depth_m in the configuration"
+    )
 
 
 def gait_problems(
@@ -47,11 +59,15 @@ def key_problems(path: GaitPath) -> Iterator[str]:
     if "swing" not in names or names.index("swing") != len(names) - 1 or len(names) < 2:
         yield f"phase = {', '.join(names) or 'none'}: the last of two or more must be a swing, and no other one"
     for number, phase in enumerate(path.phase):
-        key = _phase_key(path, number)
-        yield from (f"{key}.{problem}" for problem in _phase_problems(phase, path.right_offset_fraction > 0.0))
+        swings = "swing" in names[number : number + 2]
+        whole = "of a swing and right before one, which would begin in the mud" if swings else ""
+        if path.right_offset_fraction:
+            whole = "where right_offset_fraction keeps the flippers apart"
+        yield from (f"{_phase_key(path, number)}.{problem}" for problem in _phase_problems(phase, whole))
 
 
-def _phase_problems(phase: GaitPhase, apart: bool) -> Iterator[str]:
+def _phase_problems(phase: GaitPhase, whole: str) -> Iterator[str]:
+    """Yield what is wrong with a phase; `whole` says where it may not end early, if so."""
     for number, point in enumerate(phase.way_points, 1):
         if (point.depth_m is None) is (point.depth_fraction is None):
             yield f"way_points {number}: must have one of depth_m and depth_fraction"
@@ -64,18 +80,20 @@ def _phase_problems(phase: GaitPhase, apart: bool) -> Iterator[str]:
     if phase.curve == "half_ellipse" and len(phase.way_points) != 2:
         yield f"way_points: must be 2 for a half ellipse, its peak and its end, not {len(phase.way_points)}"
     for key in ("until_force_n", "until_depth_m"):
-        if getattr(phase, key) is not None and (apart or phase.name == "swing"):
-            where = "where right_offset_fraction keeps the flippers apart" if apart else "of a swing"
-            yield f"{key} = {getattr(phase, key):g}: must be left out {where}"
+        if whole and getattr(phase, key) is not None:
+            yield f"{key} = {getattr(phase, key):g}: must be left out {whole}"
 
 
 def _phase_key(path: GaitPath, number: int) -> str:
-    return f"phase {number + 1} ({path.phase[number].name})"
+    return f"phase {number % len(path.phase) + 1} ({path.phase[number].name})"
 
 
 def _stride_problems(path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate) -> Iterator[str]:
     """Yield the first problem of each row."""
-    for row in stride_table(path, configuration.geometry, depth_m):
+    rows = stride_table(path, configuration.geometry, depth_m)
+    if not any(row.phase is Phase.SWING for row in rows):
+        yield f"{_phase_key(path, -1)}.duration_s is missing: a swing that stays where it is has no path to end it"
+    for row in rows:
         found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration, mud))
         if problem := next(found, ""):
             yield f"{_phase_key(path, row.number)}.{problem}"
@@ -108,7 +126,7 @@ def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud:
     if inside_m > 0.0:
         yield f"{where}: the plate crosses the body by {100.0 * inside_m:.2f} cm, must be at most 0"
     if row.phase is Phase.SWING and is_in_mud(geometry, sweep_rad, lift_rad):
-        yield f"{where}: a swing must stay out of the mud, at most 0 cm deep"
+        yield f"{where}: a swing must stay out of the mud, its plate at most {100.0 * OUT_M:g} cm deep"
     lift_rad_s = geometry.adduction_velocity_rad_s(sweep_rad, lift_rad, swept_rad_s, sunk_m_s)
     speed_rad_s = max(abs(swept_rad_s), abs(lift_rad_s))
     if speed_rad_s > limits.velocity_rad_s:

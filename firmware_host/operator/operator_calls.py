@@ -23,7 +23,7 @@ from control.parameters.gait_path import GaitPath
 from control.records import JOINTS, UNKNOWN
 from estimation.ground_law import law_of_strides
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.gait_checks import gait_problems
+from firmware_host.configuration.gait_checks import depth_problem, gait_problems
 from firmware_host.configuration.gait_file import read_gait
 from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
@@ -54,7 +54,6 @@ NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
-SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 LAW_STRIDES = 5  # of each flipper, from which the law of the ground is found
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
@@ -231,12 +230,8 @@ class OperatorCalls:
 
     def _require_depth(self, depth_m: float) -> None:
         """Raise RefusedError for a depth beyond the configured ones."""
-        deepest_m = self._loop.configuration.adaptation.max_depth_m
-        if not SHALLOWEST_M <= depth_m <= deepest_m:
-            raise RefusedError(
-                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
-                f" {100.0 * deepest_m:g} cm, which is adaptation.max_depth_m in the configuration"
-            )
+        if problem := depth_problem(self._loop.configuration, depth_m):
+            raise RefusedError(problem)
 
     def change_strides(self, params: dict[str, Any], caller: Caller) -> str:
         """Set the depth of the present walk, and its gait where that is given."""

@@ -40,6 +40,15 @@ def test_a_file_of_ones_own_is_accepted_or_named(tmp_path: Path, text: str, stat
     assert status == exit_codes.OK or "mine.toml" in found.stderr
 
 
+@pytest.mark.parametrize("command", ["check", "simulate"])
+def test_a_depth_that_the_daemon_refuses_is_refused_by_the_check_too(tmp_path: Path, command: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f"depths_m = [0.02, 0.06]\n{STANCE}{SWING}", encoding="utf-8")
+    found = run("gait", command, str(path))
+    assert found.returncode == exit_codes.CONFIGURATION
+    assert "adaptation.max_depth_m" in found.stderr
+
+
 def test_a_gait_is_simulated_for_a_robot_that_is_not_calibrated_yet(tmp_path: Path) -> None:
     robot = str(tmp_path / "robot.toml")
     assert run("init", robot, "--defaults", "--flippers", "right", "--drive", "mit").returncode == exit_codes.OK

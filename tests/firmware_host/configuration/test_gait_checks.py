@@ -53,6 +53,11 @@ UNACCEPTED = {
     "no depth": (stroke(way_points=[{"sweep_deg": -30.0}]), "phase 2 (stance).way_points 1"),
     "half an ellipse": (stroke(curve="half_ellipse"), "phase 2 (stance).way_points"),
     "condition of a swing": (stroke(3, until_force_n=1.0), "phase 4 (swing).until_force_n"),
+    "swing out of the mud": (stroke(2, until_force_n=1.0), "phase 3 (extraction).until_force_n"),
+    "swing of no time": (
+        stroke(3, duration_s=None, speed_m_s=0.5, way_points=[point(-30.0, -0.0145)]),
+        "phase 4 (swing).duration_s",
+    ),
     "no swing": (stroke()[:3], "phase = insertion, stance, extraction"),
     "nothing": ([], "phase = none"),
 }
