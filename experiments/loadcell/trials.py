@@ -145,10 +145,11 @@ def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, moved_n: flo
     recorded, problems = analysed.recorded, stroke.problems
     garbled, lines = problems["garbled_lines"], len(stroke.samples) + problems["garbled_lines"]
     missing = max((fraction for _, fraction in _strokes(analysed)), default=0.0)
-    largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
+    sizes_n = np.abs(recorded.forces_n - recorded.zero_n)
+    largest_n = float(np.max(sizes_n, initial=0.0))
     checks = [
         (problems["unpluggings"], "the load cell was unplugged during the trial"),
-        (problems["overloads"] or is_clipped(recorded.forces_n), AT_ITS_LIMIT),
+        (problems["overloads"] or is_clipped(sizes_n), AT_ITS_LIMIT),
         (garbled > GARBLED_FRACTION * lines, f"{garbled} of {lines} lines were garbled: check cable and ground"),
         (analysed.problem, analysed.problem),
         (analysed.remark, analysed.remark),
@@ -186,8 +187,8 @@ def is_clipped(forces_n: Array) -> bool:
     """Return whether the largest force repeats exactly, many times in a row, in a cell that is not always still."""
     if len(forces_n) < FLAT_SAMPLES or len(np.unique(forces_n)) < FLAT_SAMPLES:
         return False
-    ends = (forces_n == np.max(forces_n)) | (forces_n == np.min(forces_n))
-    return any(np.all(ends[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(ends))
+    at_peak = forces_n == np.max(forces_n)
+    return any(np.all(at_peak[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(at_peak[: 1 - FLAT_SAMPLES]))
 
 
 def _strokes(analysed: AnalysedTrial) -> Iterator[tuple[Mask, float]]:

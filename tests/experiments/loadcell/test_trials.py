@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from experiments.loadcell.preparation import CellSettings, examine_encoder, examine_lines
@@ -89,6 +90,12 @@ def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> N
     stretch = laboratory.cell.record(0.01, 0.1, 0.1)
     assert any("at its limit" in each for each in list_problems(AnalysedTrial(clipped), stretch, 0.0))
     assert list_problems(AnalysedTrial(recorded), stretch, 0.0) == []
+    # a coarse cell repeats its smallest force at rest, and any recording may end with its largest
+    coarse = recorded._replace(forces_n=np.abs(recorded.forces_n).round(2))
+    peak_n = recorded.forces_n.max() + 1.0
+    ended = recorded._replace(forces_n=np.append(recorded.forces_n, peak_n), times_s=np.append(recorded.times_s, 1e3))
+    for sound in (coarse, ended):
+        assert list_problems(AnalysedTrial(sound), stretch, 0.0) == []
 
 
 def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
