@@ -12,7 +12,7 @@ from simulation.mud.track import paper_track
 
 def record_walks(path: Path, configuration: Configuration, *strides: int) -> Lockstep:
     """Record walks of these numbers of strides, with a hold between them; return the robot after the last walk."""
-    recorder = Recorder(path, configuration.text, {"robot": "test"})
+    recorder = Recorder(path, configuration.text, {"robot": "test"}, rig=configuration.rig)
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
     walk_and_hold(robot, *strides)
     assert recorder.dropped == 0

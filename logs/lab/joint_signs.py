@@ -76,7 +76,7 @@ def _work(rows: LogRows, angles: Floats, currents: Floats, wanted: Phase) -> flo
 
 def find_evidence(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Evidence:
     """Measure the sweeps' torques; the flippers are in the same mud."""
-    sweeps = [(angle_rad[:, joint], current_a[:, joint]) for joint in range(0, len(PUSHING), 2)]
+    sweeps = [(angle_rad[:, joint], current_a[:, joint]) for joint in range(0, angle_rad.shape[1], 2)]
     stances = [_middle_torques(rows, *sweep, Phase.STANCE) for sweep in sweeps]
     swings = [_middle_torques(rows, *sweep, Phase.SWING) for sweep in sweeps]
     stance_nm = max((abs(torque_nm) for each in stances for _, torque_nm in each), default=math.nan)

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control.records import Phase
+from control.records import Phase, Rig
 from experiments.lablogs import recording as recording_module
 from experiments.lablogs.estimates import DISTURBED, RECORDED, EvaluatedLog, read_log
 from experiments.lablogs.recording import read_recording, recording_of_lab
+from experiments.robot.lockstep_robot import simulated_configuration
 from logs.lab.columns import PAPER_CONSTANT_NM_A
 from logs.lab.lab_csv import LabLog
 from logs.replay import Replay, replay_files
+from tests.recorded_walks import record_walks
 
 ROW_S = 0.001
 
@@ -81,6 +83,11 @@ def test_missing_rows_are_missing_in_every_column(monkeypatch: pytest.MonkeyPatc
 )
 def test_a_stance_that_needs_more_than_friction_is_evidence_of_mud(lab: LabLog, in_mud: bool) -> None:
     assert recording_of_lab(lab).has_evidence_of_mud() is in_mud
+
+
+def test_a_log_of_a_robot_with_one_flipper_shows_its_mud(tmp_path: Path) -> None:
+    record_walks(tmp_path / "one.mcap", simulated_configuration(rig=Rig(("right",))), 1)
+    assert read_recording([tmp_path / "one.mcap"]).has_evidence_of_mud()
 
 
 def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(two_walks: Path) -> None:
