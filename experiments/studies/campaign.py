@@ -80,7 +80,7 @@ def _write(campaign: Campaign, walked: DataFrame, path: Path) -> None:
         | build_metadata()
         | {"sources": record["sources"], "run": run, "file": f"{run}, point {row['point']}, seed {row['seed']}"}
         | row["values"]
-        for row in walked.to_dict("records")
+        for row in walked.astype(object).where(walked.notna(), None).to_dict("records")  # NULL in SQL, and not NaN
     ]
     if rows:
         write_trials(path, rows, list(campaign.points[0]), {"campaign": run} | record)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pandas import DataFrame
 
 from command_line import exit_codes
 from command_line.main import main
@@ -16,7 +17,7 @@ from experiments.studies import campaign as campaign_module
 from experiments.study.notebook import NAME, Notebook
 from firmware_host.configuration.file_problems import ConfigurationError
 from logs.catalogue.catalogue import Catalogue
-from logs.catalogue.entry import COLUMNS, TRIALS
+from logs.catalogue.entry import COLUMNS, TRIALS, LogEntry, values_of_entry
 from tests.folders import ROOT
 
 pytestmark = pytest.mark.usefixtures("png_alone")
@@ -252,3 +253,12 @@ def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) ->
     )
     entry = run_walk(tables_of(campaign)[0], 1)
     assert entry["state"] == "broken" and entry["reason"] and entry["strides"] == 0
+
+
+def test_what_is_not_known_of_a_walk_is_null_in_the_results(tmp_path: Path) -> None:
+    campaign, walked = loaded(tmp_path, SHORT), LogEntry("", "whole", "", 0, 0, walks=1, speed_m_s=0.1)
+    entries = [values_of_entry(each) for each in (walked, walked._replace(state="broken", speed_m_s=None))]
+    rows = [{"point": 1, "seed": n, "values": campaign.points[0]} | each for n, each in enumerate(entries, 1)]
+    campaign_module._write(campaign, DataFrame(rows), tmp_path / TRIALS)
+    found = Catalogue(tmp_path).query("select avg(speed_m_s), count(speed_m_s), sum(walks) from trials")
+    assert found.rows == [(0.1, 1, 2)]
