@@ -1,6 +1,6 @@
 """Commands on the catalogue of many logs: index, query; and its use by `log list`."""
 
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -91,5 +91,11 @@ def query(
 
 
 def _for_json(value: Any) -> Any:
-    """Return numbers, texts, lists and structures as they are, and times and other values of SQL as text."""
-    return value if isinstance(value, str | int | float | list | dict | None) else str(value)
+    """Return numbers, texts, lists and structures as JSON has them, and times and other values of SQL as text."""
+    if isinstance(value, dict):
+        return {str(key): _for_json(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_for_json(each) for each in value]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value if isinstance(value, str | int | float | None) else str(value)

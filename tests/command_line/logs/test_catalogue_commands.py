@@ -33,6 +33,12 @@ def test_a_query_is_answered_as_text_and_as_json(folder: Path) -> None:
     assert json_of("log", "query", query, str(folder))["rows"][0]["strides"] == 6
 
 
+def test_every_value_of_sql_has_its_json(folder: Path) -> None:
+    values = "'nan'::double a, ['inf'::double, 1.5] b, {'c': [date '2026-11-29']} d, map {1: 0.5::decimal(4, 2)} e"
+    (row,) = json_of("log", "query", f"select {values}", str(folder))["rows"]
+    assert row == {"a": None, "b": [None, 1.5], "d": {"c": ["2026-11-29"]}, "e": {"1": "0.50"}}
+
+
 def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = catalogue_path(folder)
     duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
