@@ -51,7 +51,7 @@ UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³
     "speed": "cm/s",
     "lowest supply": "V",
 }
-NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w])")
 SINCE = "Times count from the beginning of the log."
 UNCERTAINTY = (
     "Values have their standard errors. Coefficients are means over the strides of a mud; ≥ marks a lower bound. They "

@@ -86,6 +86,8 @@ def test_events_that_differ_in_numbers_are_one_group_with_their_ranges() -> None
         (0.0, 3.0, 3, "depth 0.0275 to 0.0500 m: fastest"),
         (1.0, "", 1, "mode hold to walking"),
     ]
+    (group,) = group_events(events("at -3.2 mm", "at 0.5 mm", "at -1.0 mm"), 0.0)
+    assert group["event"] == "at -3.2 to 0.5 mm"
     assert len(group_events(events("robot R1 held", "robot R2 held"), 0.0)) == 2  # names with digits are no numbers
 
 
