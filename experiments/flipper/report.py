@@ -107,7 +107,7 @@ def _report_of(by_mud: Trials, configuration: Configuration, truth: TruthOfMud |
     for mud, trial in ((mud, trial) for mud, trials in by_mud.items() for trial in trials):
         known = truth_in(truth, mud) if truth else trial["truths"].get("0", {})
         for name, strides in trial["strides"].items():
-            rows += compared_rows(strides[0], known, mud=mud, method=name) if strides else []
+            rows += compared_rows(strides[0], known, mud=mud, method=name, trial=trial["trial"]) if strides else []
     compared = compared_frame(rows)
     muds = mud_summaries(compared, by_mud, method, fmean)
     for summary in muds:

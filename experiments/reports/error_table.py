@@ -30,7 +30,7 @@ def error_rows(evaluations: DataFrame) -> list[Row]:
 def error_frame(evaluations: DataFrame, *keys: str) -> DataFrame:
     """Return the errors of the groups that differ in these keys alone, pooled over the others."""
     pooled = evaluations.assign(**{key: "" for key in KEYS if key not in keys})
-    return DataFrame(error_rows(pooled))[[*keys, *SHOWN]]
+    return DataFrame(error_rows(pooled), columns=[*keys, *SHOWN])
 
 
 def _errors(group: DataFrame) -> Row:

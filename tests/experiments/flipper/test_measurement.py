@@ -187,6 +187,14 @@ def test_the_report_says_whether_coefficients_fall_with_water(
     assert report(entries_of(values), tuple(values)[::-1])["falls_with_water"]["k_p"] is falls
 
 
+def test_one_stride_of_each_trial_does_not_show_whether_its_claim_is_right() -> None:
+    entries = entries_of({"47.6": [2e6, 2.2e6]})
+    for entry in entries.values():
+        entry["strides"][DEFAULT][0]["k_p"]["repeatability"] = 0.05e6
+    errors = report(entries, ("47.6",), {"47.6": {"k_p": 2e6}})["errors"]
+    assert [(row["strides"], row["chi"]) for row in errors] == [(2, None)]
+
+
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
     by_mud = trials_by_mud(("51.2", "30"), entries_of({"47.6": [2e6], "51.2": [1e6]}))
     assert list(by_mud) == ["51.2", "47.6"]

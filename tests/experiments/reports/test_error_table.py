@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pandas import DataFrame
 
-from experiments.reports.error_table import KEYS, Row
+from experiments.reports.error_table import KEYS, Row, error_frame
 from experiments.reports.error_table import error_rows as rows_of_frame
 from experiments.reports.error_table import plate_rows as plates_of_frame
 
@@ -33,6 +33,11 @@ def bound(value: float, std_error: float = 0.0, kind: str = "bound") -> Row:
 def only(rows: list[Row]) -> Row:
     (row,) = rows
     return row
+
+
+def test_errors_of_nothing_are_an_empty_table_with_its_columns() -> None:
+    found = error_frame(DataFrame(columns=list(evaluated(1.0))), "coefficient")
+    assert not len(found) and {"coefficient", "median", "strides"} <= set(found.columns)
 
 
 def test_median_and_95th_percentile_are_of_the_size_of_the_error() -> None:
