@@ -21,6 +21,8 @@ SCHEMAS = {  # what prints it -> version
     "demo": 1,
     "drives-find": 1,
     "probe": 1,
+    "trial": 1,
+    "note": 1,
     "replay": 1,
     "log-annotate": 1,
     "log-comparison": 1,

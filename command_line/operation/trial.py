@@ -44,7 +44,9 @@ def trial(
         raise usage_error("'mudskipper trial set KEY=VALUE ...' changes the defaults, 'mudskipper trial' shows them")
     with StatusClient(socket) as client:
         report = client.call("trial_set", **dict(values)) if values else client.call("trial")
-    return Answer(report, trial_text({"default": report["defaults"], "this walk, or the last": report["present"]}))
+    return Answer(
+        report, trial_text({"default": report["defaults"], "this walk, or the last": report["present"]}), schema="trial"
+    )
 
 
 def note(
@@ -58,4 +60,4 @@ def note(
         raise usage_error("a note needs a text, such as 'mudskipper note \"rained last night\"'")
     with StatusClient(socket) as client:
         written: dict[str, Any] = client.call("mark" if mark else "note", text=text)
-    return Answer(written, f"{written['time']}  {written['stamp_s']:.4f} s by the robot's clock")
+    return Answer(written, f"{written['time']}  {written['stamp_s']:.4f} s by the robot's clock", schema="note")

@@ -76,7 +76,11 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
     time.sleep(2.0 * WATCHDOG_S)  # only the drives' own watchdogs can have acted
     bench.restart_daemon()
     report = bench.wait_for(lambda report: report["mode"] == "idle")
-    assert json.loads(bench.run("trial", "--json").stdout) == {"defaults": defaults, "present": {}}
+    assert json.loads(bench.run("trial", "--json").stdout) == {
+        "schema": "trial/1",
+        "defaults": defaults,
+        "present": {},
+    }
     assert not any(drive["closed_loop"] for drive in report["drives"])
     assert {drive["errors"] for drive in report["drives"]} == {"watchdog expired"}
     assert report["fault"]["name"] == "drive_error"
