@@ -4,7 +4,7 @@ An unfinished MCAP file lacks the summary at its end, without which most readers
 (file_pass.py) reads its records one after the other. A chunk whose checksum does not fit is skipped by its length, and
 its rows are lost; where a length itself is damaged, the reading ends. The rows keep the layout that the file describes;
 where the description is lost, they are taken to have that of this version. An event in the rewritten log says how many
-rows were lost, and so does the metadata at its beginning, so the file is read twice: once to count, once to write.
+rows were lost, and so does the metadata at its beginning, so the file is read once to count, and once to write.
 
 The damaged file is renamed to NAME.broken; the new one is written, synchronised and renamed; only then is the damaged
 one removed. A recovery that is interrupted at any point is continued by the next one.

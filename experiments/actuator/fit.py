@@ -94,7 +94,7 @@ def loads_of(plan: WeighingPlan, entries: Mapping[str, Entry]) -> DataFrame:
 
 
 def tare_of(entries: Mapping[str, Entry], trial: int) -> float | None:
-    """Return the current of the empty arm: the mean of before and after, or the nearest one."""
+    """Return the current of the empty arm: the mean of before and after, or the last one before."""
     neighbours = [current_a for number in (trial - 1, trial) if (current_a := _tare_a(entries, number)) is not None]
     if neighbours:
         return fmean(neighbours)

@@ -23,7 +23,7 @@ Values = dict[str, Any]  # by key
 
 @dataclass(frozen=True)
 class Range:
-    """Values from `min` to `max`: whole numbers where both are, uniform in the logarithm where `logarithmic`."""
+    """Values from `min` to `max`, uniform in the logarithm where `logarithmic`, else whole numbers where both are."""
 
     min: float
     max: float

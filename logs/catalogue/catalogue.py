@@ -115,7 +115,7 @@ class Catalogue:
         return [entry_of_row(row) for row in self._connection.execute("SELECT * FROM logs ORDER BY file").fetchall()]
 
     def update(self, watch: Watch, longest_s: float = inf, broken_again: bool = False) -> int:
-        """Read new and changed logs for at most `longest_s`, and stores the table where it changed.
+        """Read new and changed logs, none that begins after `longest_s`, and store the table where it changed.
 
         `broken_again` also reads the logs again that could not be read: rights or this program may have changed.
         Returns the number of logs that are still to be read. Raises OSError where the table cannot be stored. An
