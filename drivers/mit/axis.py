@@ -5,7 +5,8 @@ command as their stamp and their torque is that of the command before. No code i
 tick commands a drive that is to be idle to leave the mode; a lost command is repeated by the next tick.
 
 A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
-without a fault after the command to enter, until a command to leave, also another program's, or a restart.
+without a fault after the command to enter, until a command to leave, also another program's, or a restart. So does a
+RobStride, which is asked for its faults in place of the supply.
 drivers/answering_axis.py finds restarts and a second drive with this id. A command that arrives here comes from another
 program; one that does not, such as a command on the drive's serial line, shows in the torque that the answers measure.
 """
@@ -22,9 +23,9 @@ from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import FLOAT, SUPPLY_V, MitSettings
 from drivers.setpoint_monitor import TOLERANCE_NM, SetpointMonitor
 
-MASTER_ID = 0  # under which older CubeMars answer, all of a bus
+MASTER_ID = 0  # under which older CubeMars answer, all of a bus, and RobStrides as their manual has it
 TURN_RAD = 2.0 * pi
-HARMLESS = frozenset({codec.LEAVE, codec.CLEAR})  # commands that any program may send
+HARMLESS = frozenset({codec.LEAVE, codec.CLEAR, codec.FAULT_QUESTION})  # commands that any program may send
 
 
 class MitAxis(AnsweringAxis):
@@ -47,7 +48,7 @@ class MitAxis(AnsweringAxis):
 
     def reset(self) -> None:
         super().reset()
-        self._status = 0
+        self._status = self._told_fault = 0  # the latter by a RobStride, when it was asked
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -58,6 +59,9 @@ class MitAxis(AnsweringAxis):
                 node_id: self._receive_foreign,
                 codec.REGISTER_ID: self._receive_foreign_register,
             }
+        if self._ranges.reports_faults_apart:
+            masters = dict.fromkeys((MASTER_ID, codec.ROBSTRIDE_MASTER), self._receive_master)
+            return {node_id: self._receive_foreign, **masters}
         return {node_id: self._receive_shared, MASTER_ID: self._receive_master}
 
     def _receive(self, data: bytes, now_s: float) -> None:
@@ -80,7 +84,13 @@ class MitAxis(AnsweringAxis):
             self._receive_answer(data, now_s)
 
     def _receive_master(self, data: bytes, now_s: float) -> None:
-        if data[:1] == bytes([self.parameters.node_id]):
+        """Handle what arrives under an id that all drives of a bus share, by the first byte."""
+        if data[:1] != bytes([self.parameters.node_id]):
+            return
+        if self._ranges.reports_faults_apart and codec.is_faults(data):
+            self._on_answer()
+            self._told_fault = codec.decode_faults(data)
+        else:
             self._receive_answer(data, now_s)
 
     def _receive_answer(self, data: bytes, now_s: float) -> None:
@@ -102,8 +112,9 @@ class MitAxis(AnsweringAxis):
             faulty = answer.status not in (codec.DISABLED, codec.ENABLED)
             self._receive_status(answer.status, answer.status if faulty else 0)
         else:
-            follows = self._following and not answer.fault
-            self._receive_status(codec.ENABLED if follows else codec.DISABLED, answer.fault)
+            fault = answer.fault or self._told_fault
+            follows = self._following and not fault
+            self._receive_status(codec.ENABLED if follows else codec.DISABLED, fault)
         if self.closed_loop:
             self.setpoints.on_report(answer.torque_nm, answer.velocity_rad_s)
         self.setpoints.on_heartbeat(self.closed_loop)
@@ -135,7 +146,7 @@ class MitAxis(AnsweringAxis):
 
     def _on_restart(self) -> None:
         super()._on_restart()
-        self._following = False
+        self._following, self._told_fault = False, 0
 
     def _build_health(self) -> DriveHealth:
         errors = codec.error_text(self._error_flags)
@@ -177,13 +188,16 @@ class MitAxis(AnsweringAxis):
         self._transmit(codec.LEAVE)
 
     def clear_errors(self) -> None:
-        """Clear a Damiao's errors; those of a CubeMars end with their cause or with its supply."""
-        self._transmit(codec.CLEAR if self._ranges.has_registers else codec.LEAVE)
+        """Clear the errors of a Damiao or a RobStride; those of a CubeMars end with their cause or with its supply."""
+        clears = self._ranges.has_registers or self._ranges.reports_faults_apart
+        self._transmit(codec.CLEAR if clears else codec.LEAVE)
 
     def request_supply(self) -> None:
-        """Ask a Damiao for its voltage; neither maker's drives report the current of their supply."""
+        """Ask a Damiao for its voltage, a RobStride for its faults; none reports the current of its supply."""
         if self._ranges.has_registers:
             self._outlet.send(self._supply_request)
+        elif self._ranges.reports_faults_apart:
+            self._transmit(codec.FAULT_QUESTION)
 
     def request_settings(self, now_s: float) -> None:
         request = self.settings.due_request(now_s)

@@ -1,4 +1,5 @@
 """Finds drives in MIT mode: by the state request and the registers of a Damiao, and by the command to leave the mode.
+A RobStride is known by the id under which it answers, unless that is 0.
 
 A Damiao answers a request that is no command, so what another program does with it goes on. Every other drive, and old
 firmware of a Damiao, answers commands alone. Leaving the mode, which ends torque, is the only one that cannot exert it.
@@ -22,6 +23,7 @@ from drivers.mit.setup import NOTHING, DamiaoSetup, is_answer, is_register, mode
 NAME = "mit"
 IDS = range(1, LARGEST_ID + 1)
 ASKED = (SOFTWARE, SERIAL, PMAX, VMAX, TMAX)
+ROBSTRIDE, UNKNOWN = "a RobStride", "a CubeMars, or firmware without registers"
 OTHER_REPORT = 0x29  # in the upper bits of an extended id, above the drive's: a CubeMars that speaks another protocol
 OTHER_HARDWARE = "a CubeMars V3, or one in servo mode"
 OTHER_PROBLEM = "it reports by extended ids (0x29xx), another protocol, which is not supported: see docs/how-to/mit.md"
@@ -84,8 +86,8 @@ def _read_registers(port: BenchPort, node_ids: Iterable[int]) -> dict[int, Value
 def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDrive]:
     """Yield one drive for each answer to one question; a Damiao has registers, a CubeMars none."""
     if not values:
-        for _ in ids:
-            yield FoundDrive(NAME, node_id, "a CubeMars, or firmware without registers")
+        for each in ids:
+            yield FoundDrive(NAME, node_id, ROBSTRIDE if each == codec.ROBSTRIDE_MASTER else UNKNOWN)
         return
     models = models_of({register: min(found) for register, found in values.items()})
     firmware = ", ".join(f"{each:.0f}" for each in sorted(values.get(SOFTWARE, ())))

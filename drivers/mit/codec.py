@@ -1,8 +1,10 @@
-"""MIT mode, as the MIT mini cheetah's motors, CubeMars and Damiao speak it: commands and answers of eight bytes.
+"""MIT mode of the mini cheetah's motors, CubeMars, Damiao and RobStride: commands and answers of eight bytes.
 
 A command goes to the drive's own id and packs position (16 bits), velocity, kp, kd and torque (12 bits each) as codes
 of a model's ranges, big-endian. Four payloads of FF and one last byte are other commands: FC enters the mode, FD leaves
-it, FE makes the present position zero, FB clears a Damiao's errors. A drive only sends one answer to each command.
+it, FE makes the present position zero, FB clears the errors of a Damiao and of a RobStride. A drive only sends one
+answer to each command. A RobStride's answer ends in a temperature of 16 bits in place of one and a fault: its faults
+are told in an answer of another form, to a question of their own.
 
 A code is (x + range) · (2ⁿ - 1) / (2 · range), so zero lies in the middle of two codes and no command has zero torque.
 Its code here is the nearest one, of the two the upper: the drive follows half a step, range / 4095. A drive is without
@@ -11,7 +13,8 @@ torque only outside of the mode. Torque is rounded to the nearest code here; the
 Drives truncate too (float_to_uint), so a code of an answer stands for the step above it, and is decoded as its middle:
 a joint at rest reads exactly zero, and the mean of many answers is right. The published decoders return the lower end.
 
-Sources: Core/Src/can.c of bgkatz/motorcontrol; damiao-motor 1.0.6; TMotorCANControl 1.2.6; see docs/how-to/mit.md.
+Sources: Core/Src/can.c of bgkatz/motorcontrol; damiao-motor 1.0.6; TMotorCANControl 1.2.6; RobStride User Manuals of
+2026-04-28, section 6; see docs/how-to/mit.md.
 """
 
 from math import nan
@@ -24,6 +27,8 @@ from drivers.mit.models import TORQUE_CODES, Model
 ANSWER_BYTES = 8
 _SPECIAL = b"\xff" * 7
 ENTER, LEAVE, SET_ZERO, CLEAR = (_SPECIAL + bytes([last]) for last in (0xFC, 0xFD, 0xFE, 0xFB))
+FAULT_QUESTION = b"\xff" * 6 + b"\x00\xfb"  # to a RobStride, and no command
+ROBSTRIDE_MASTER = 0xFD  # the id under which a RobStride answers, where it is not 0
 _PURE_TORQUE = bytes.fromhex("8000 8000 0000")  # codes of zero position and velocity; kp and kd exactly 0
 ZERO_CODE = (TORQUE_CODES + 1) // 2
 _ANSWER = Struct(">BHBBBBB")
@@ -50,11 +55,14 @@ FAULT_NAMES = {
     0xC: "rotor too hot",
     LOST_COMMANDS: "watchdog expired",
     0xE: "overload",
+    0x10: "driver chip",
+    0x11: "another fault, see the makers' manual",
 }
+_FAULTS_OF_BITS = ((2, 4), (3, 3), (4, 2), (5, 2), (16, 2), (0, 1), (1, 0x10), (7, 5), (14, 0xE))  # of a RobStride
 
 
 class Answer(NamedTuple):
-    """The answer to a command; `status` is a Damiao's, `fault` a CubeMars's."""
+    """The answer to a command; `status` is a Damiao's, `fault` a CubeMars's. A RobStride has neither of them here."""
 
     node_id: int
     status: int
@@ -71,6 +79,8 @@ class Answer(NamedTuple):
 
 def feedback_id(node_id: int, model: Model) -> int:
     """Return the id under which a drive answers: a CubeMars its own; a Damiao as the set-up page sets MST_ID."""
+    if model.reports_faults_apart:
+        return ROBSTRIDE_MASTER
     return node_id + 16 if model.has_registers else node_id
 
 
@@ -105,6 +115,8 @@ def decode_answer(data: bytes, model: Model) -> Answer:
     if len(data) != ANSWER_BYTES:
         raise MalformedMessageError(f"an answer of {len(data)} bytes")
     head, position, velocity, middle, torque, temperature, last = _ANSWER.unpack(data)
+    if model.reports_faults_apart:
+        temperature, last = (temperature << 8 | last) / 10.0, 0
     return Answer(  # by position: it is built for every drive in every tick
         head & 0xF,
         head >> 4,
@@ -122,8 +134,25 @@ def encode_answer(answer: Answer, model: Model) -> bytes:
     torque = _encode(answer.torque_nm, model.torque_nm, TORQUE_CODES)
     middle = (velocity & 0xF) << 4 | torque >> 8
     head = answer.status << 4 | answer.node_id
-    temperature = round(min(max(answer.temperature_c, 0.0), 255.0))
-    return _ANSWER.pack(head, position, velocity >> 4, middle, torque & 0xFF, temperature, answer.last)
+    temperature, last = round(min(max(answer.temperature_c, 0.0), 255.0)), answer.last
+    if model.reports_faults_apart:
+        temperature, last = divmod(round(min(max(answer.temperature_c, 0.0), 6553.5) * 10.0), 256)
+    return _ANSWER.pack(head, position, velocity >> 4, middle, torque & 0xFF, temperature, last)
+
+
+def encode_faults(node_id: int, faults: int) -> bytes:
+    return bytes([node_id]) + faults.to_bytes(4, "little") + bytes(3)
+
+
+def is_faults(data: bytes) -> bool:
+    """Return whether an answer of a RobStride tells its faults. A state at the lowest torque and 0 °C never occurs."""
+    return len(data) == ANSWER_BYTES and data[4:] == bytes(4)
+
+
+def decode_faults(data: bytes) -> int:
+    """Return the first of these faults as a number of FAULT_NAMES; zero for none."""
+    faults = int.from_bytes(data[1:5], "little")
+    return next((fault for bit, fault in _FAULTS_OF_BITS if faults >> bit & 1), 0x11) if faults else 0
 
 
 def encode_read(node_id: int, register: int) -> bytes:

@@ -18,10 +18,13 @@ from drivers.mit.settings import SUPPLY_V
 # All other signals of an answer arrive together or not at all: no code says that one is unknown.
 ROTOR_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(7, 8, bytes(1))}  # of a Damiao
 DRIVE_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(6, 7, bytes(1))}  # of a CubeMars
+WIDE_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(6, 8, bytes(2))}  # of a RobStride
 SIGNALS = ("position", "current", "heartbeat", "error", "temperature")
 DAMIAO_OFFSET = 16  # of the id under which a Damiao answers
 OVERCURRENT = 0xA  # of a Damiao; its low bits are that of a CubeMars
+ROBSTRIDE_OVERCURRENT = 1 << 4  # of phase B
 MODEL = MODELS["DM4310"]
+ROBSTRIDES = frozenset(name for name, model in MODELS.items() if model.reports_faults_apart)
 
 
 class Mit(DriveType):
@@ -36,9 +39,11 @@ class Mit(DriveType):
     reports = (FrameRate(codec.ANSWER_BYTES, RATE_HZ),)
 
     def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
-        """Also those of the other maker's drives, which differ in the model alone."""
+        """Also those of other makers' drives, which differ in the model alone."""
         node_id = parameters.node_id
-        return frozenset({MASTER_ID, node_id, node_id + DAMIAO_OFFSET, codec.REGISTER_ID})
+        of_robstride = isinstance(parameters, MitParameters) and parameters.model in ROBSTRIDES
+        masters = {MASTER_ID, codec.ROBSTRIDE_MASTER} if of_robstride else {MASTER_ID}
+        return frozenset({*masters, node_id, node_id + DAMIAO_OFFSET, codec.REGISTER_ID})
 
     def query(self, node_id: int) -> Frame:
         return Frame(node_id, codec.LEAVE)
@@ -62,6 +67,9 @@ class Mit(DriveType):
             return None
         if identifier == codec.REGISTER_ID and data:
             return FrameContent(data[0] & LARGEST_ID)
+        if identifier == codec.ROBSTRIDE_MASTER and data:
+            signals = ("error",) if codec.is_faults(data) else SIGNALS
+            return FrameContent(data[0] & LARGEST_ID, signals=signals, spans=WIDE_TEMPERATURE)
         node_id = identifier & LARGEST_ID
         if identifier > DAMIAO_OFFSET + LARGEST_ID or not node_id:
             return None
@@ -81,10 +89,13 @@ class Mit(DriveType):
         }
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Set a Damiao's status, or the fault of a CubeMars."""
+        """Set a Damiao's status, or the fault of a CubeMars; that of a RobStride where it tells its faults."""
         data, of_damiao = frame.data, frame.arbitration_id > LARGEST_ID
         if len(data) != codec.ANSWER_BYTES:
             return data
+        if frame.arbitration_id == codec.ROBSTRIDE_MASTER:
+            told = codec.is_faults(data) and flags
+            return codec.encode_faults(data[0], ROBSTRIDE_OVERCURRENT) if told else data
         if of_damiao:
             status = 0x8 | flags & 0x7 if flags else codec.DISABLED if idle else data[0] >> 4
             return bytes([data[0] & 0xF | status << 4]) + data[1:]

@@ -1,4 +1,5 @@
-"""Reads, writes and stores the registers of one Damiao over CAN. A CubeMars has none that MIT mode can read or write.
+"""Reads, writes and stores the registers of one Damiao over CAN. A CubeMars has none that MIT mode can read or write,
+and those of a RobStride are left to its makers' tool.
 
 The answers come under the id MST_ID, which may be any, so an answer is known by what it contains: the drive's own id,
 the kind, the register. Storing (0xAA) is acknowledged; that it lasts shows only after the supply was switched off and
@@ -50,9 +51,9 @@ def node_of(frame: Frame) -> int:
 
 
 def is_answer(frame: Frame, node_id: int) -> bool:
-    """Drives answer under their own id, under that plus 16 as the set-up page says, or under 0 as delivered."""
+    """Drives answer under their own id, that plus 16 as the set-up page says, or 0 or a RobStride's master's."""
     known = frame.is_plain and len(frame.data) == codec.ANSWER_BYTES and node_of(frame) == node_id
-    return known and frame.arbitration_id in (0, node_id, node_id + 16)
+    return known and frame.arbitration_id in (0, node_id, node_id + 16, codec.ROBSTRIDE_MASTER)
 
 
 def is_register(frame: Frame, node_id: int) -> bool:

@@ -196,12 +196,23 @@ def cubemars(node: int = NODE) -> Protocol:
     )
 
 
+def robstride(node: int = NODE) -> Protocol:
+    """A RobStride is also asked for its faults, by a frame under the id of its torque."""
+    other = damiao(node, "RS05")
+    return other._replace(
+        always=[Frame(node, mit.LEAVE), Frame(node, mit.CLEAR), Frame(node, mit.FAULT_QUESTION)],
+        never=[*other.never, *other.always[2:]],
+        no_torque=[*other.no_torque, bytes.fromhex("ffffffffffff01fc"), bytes.fromhex("ffffffffffff00fd")],
+    )
+
+
 PROTOCOLS: dict[str, Callable[[int], Protocol]] = {
     "odrive": odrive,
     "odrive05": odrive05,
     "moteus": of_moteus,
     "damiao": damiao,
     "cubemars": cubemars,
+    "robstride": robstride,
 }
 
 

@@ -45,6 +45,7 @@ SUPPLIES = {  # voltage and current that each type reports
     "moteus": (23.0, SUPPLIED_A),
     "mit": (23.0, None),
     "mit:AK80-9": (None, None),
+    "mit:RS05": (None, None),
 }
 
 

@@ -22,7 +22,7 @@ from tests.firmware_host.observed_loop import Observer
 from verification.example_robot import load_example
 
 TRACK = Track([(1.0, MUDS["48.5"])])
-TYPES = ("odrive", "odrive05", "moteus", "mit", "mit:AK80-9")
+TYPES = ("odrive", "odrive05", "moteus", "mit", "mit:AK80-9", "mit:RS05")
 FD_BYTES = 64  # of the longest CAN FD frame
 RECORDED_TICKS = 400  # from the start on, in which the drives' settings are read
 BABBLE_FRAMES = 400

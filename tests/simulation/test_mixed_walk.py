@@ -44,7 +44,10 @@ def robot_with(text: str, **changes: float | str) -> Lockstep:
 
 def walked(text: str) -> Mapping[str, float]:
     """Return the mud's coefficients by drives whose currents have little noise."""
-    robot = robot_with(text, current_noise_a=0.02)
+    return walked_by(robot_with(text, current_noise_a=0.02))
+
+
+def walked_by(robot: Lockstep) -> Mapping[str, float]:
     robot.arm()
     robot.walk(WalkOrder(0.03, adaptive=False))
     robot.run_until(lambda: robot.loop.learning.strides_closed >= 2 * STRIDES, 8.0)
@@ -69,17 +72,17 @@ def test_the_mud_is_the_same_with_any_drives(types: tuple[str, str], mud: Mappin
     assert walked(text) == pytest.approx(dict(mud), rel=0.02)
 
 
-def test_drives_whose_watchdog_is_proven_are_armed_without_force() -> None:
-    text = with_drive_type(EXAMPLE, "mit:AK80-9")
+@pytest.mark.parametrize("model", ["AK80-9", "RS05"])
+def test_drives_whose_watchdog_is_proven_are_armed_without_force_and_walk(model: str, mud: Mapping[str, float]) -> None:
+    text = with_drive_type(EXAMPLE, f"mit:{model}")
     configuration = parse_configuration(text)
     proven: dict[str, DriveParameters] = {
-        joint: replace(drive, proven_watchdog=ProvenWatchdog(0.3, drive.bus, drive.node_id, "AK80-9", "2026-11-24"))
+        joint: replace(drive, proven_watchdog=ProvenWatchdog(0.3, drive.bus, drive.node_id, model, "2026-11-24"))
         for joint, drive in configuration.drive.items()
         if isinstance(drive, MitParameters)
     }
-    robot = Lockstep(replace(configuration, drive=proven), TRACK, drives=drives_of(configuration))
-    robot.arm()
-    assert robot.loop.mode is Mode.HOLD and not robot.loop.forced
+    robot = Lockstep(replace(configuration, drive=proven), TRACK, drives=drives_of(configuration, current_noise_a=0.02))
+    assert walked_by(robot) == pytest.approx(dict(mud), rel=0.03) and not robot.loop.forced
 
 
 def test_a_drive_with_the_ranges_of_another_model_is_not_armed_by_force_either() -> None:

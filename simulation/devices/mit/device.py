@@ -1,11 +1,12 @@
-"""Simulates a motor drive on the bus: a Damiao or a CubeMars in MIT mode, byte for byte, with a Damiao's registers.
+"""Simulates a motor drive on the bus: a Damiao, CubeMars or RobStride in MIT mode, byte for byte, with the registers of
+a Damiao.
 
 In the mode it follows kp, kd and torque of the newest command within its ranges and the motor's current; outside of it
 the motor is without torque and the command is only remembered, to be followed as soon as the mode is entered. Its
 watchdog runs in the mode only and is fed by commands alone, that of a CubeMars by torque alone. Once it expires, a
 Damiao leaves the mode with the status "lost commands" until its errors are cleared; a CubeMars here remains in the mode
-without torque, as the motors of the mini cheetah do, and reports nothing. Sources: Core/Src/can.c and fsm.c of
-bgkatz/motorcontrol; damiao-motor 1.0.6.
+without torque, as the motors of the mini cheetah do, and reports nothing. A RobStride leaves the mode without a fault.
+Sources: Core/Src/can.c and fsm.c of bgkatz/motorcontrol; damiao-motor 1.0.6; RobStride User Manuals of 2026-04-28.
 
 It sends nothing but the answer to a command, with the values of before; a Damiao also answers the question for its
 state. Its angles are radians. A new zero outlasts a restart in a Damiao only.
@@ -29,6 +30,7 @@ KP_NM_RAD, KD_NM_S_RAD = 500.0, 5.0  # the largest gains
 STEPS = 4095
 # The status of a Damiao; its last three bits are the fault that a CubeMars reports.
 ERRORS = {DriveError.OVERCURRENT: 0xA, DriveError.OVERSPEED: 0xE, DriveError.WATCHDOG: codec.LOST_COMMANDS}
+ROBSTRIDE_BITS = {0xA: 1 << 4, 0xE: 1 << 14}  # of these errors in the faults that a RobStride tells
 FORGED_COMMANDS = {Forgery.EMERGENCY_STOP: codec.LEAVE, Forgery.CLOSE_LOOP: codec.ENTER}
 FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
     Forgery.OLD_FIRMWARE: (SOFTWARE, 0.0),
@@ -111,6 +113,8 @@ class SimulatedMit(SimulatedDrive):
             return answer_register(self.registers, self.stored, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""
+        if frame.data == codec.FAULT_QUESTION and self._model.reports_faults_apart:
+            return codec.encode_faults(parameters.node_id, ROBSTRIDE_BITS.get(self.status, 0))
         state = self._state()
         answer = self._new_or_repeated(Answer, lambda: state)
         self._execute(frame.data, now_s)
@@ -187,9 +191,11 @@ class SimulatedMit(SimulatedDrive):
 
     def _motor_nm(self, now_s: float) -> float:
         expired = 0.0 < self.registers[TIMEOUT] * TIMEOUT_UNIT_S < now_s - self._fed_s
-        self._limp = expired and not self._model.has_registers
-        if expired and self.energised:
-            self.trip(DriveError.WATCHDOG)
+        if self._model.has_registers or self._model.reports_faults_apart:
+            if expired and self.energised:
+                self.status = codec.LOST_COMMANDS if self._model.has_registers else codec.DISABLED
+        else:
+            self._limp = expired
         if not self.energised:
             self._torque_nm = 0.0
             return 0.0

@@ -37,9 +37,14 @@ def found(*drives: SimulatedDrive, fd: bool = False) -> tuple[FoundDrive, ...]:
             ],
         ),
         (
-            [simulated("mit", 1, "0badcafe", model="DM8009"), simulated("mit", 15, model="AK80-9")],
+            [
+                simulated("mit", 1, "0badcafe", model="DM8009"),
+                simulated("mit", 7, model="RS05"),
+                simulated("mit", 15, model="AK80-9"),
+            ],
             [
                 ("mit", 1, "DM8009", "5013", "0badcafe"),
+                ("mit", 7, "a RobStride", "", ""),
                 ("mit", 15, "a CubeMars, or firmware without registers", "", ""),
             ],
         ),

@@ -14,8 +14,8 @@ from drivers.mit.models import MODELS
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import PMAX
 
-DAMIAO, CUBEMARS = "DM4310", "AK80-9"
-each_model = pytest.mark.parametrize("model", [DAMIAO, CUBEMARS])
+DAMIAO, CUBEMARS, ROBSTRIDE = "DM4310", "AK80-9", "RS05"
+each_model = pytest.mark.parametrize("model", [DAMIAO, CUBEMARS, ROBSTRIDE])
 NODE = 1
 TICK_S = 0.0026
 
@@ -136,6 +136,24 @@ def test_only_commands_that_stop_a_drive_are_anybody_s(data: bytes, foreign: int
         bench = Bench(model)
         bench.hear(NODE, data)
         assert bench.axis.health.foreign_commands == foreign
+
+
+@pytest.mark.parametrize("master", [0, 0xFD])
+def test_a_fault_that_a_robstride_tells_when_asked_ends_the_mode_until_it_is_cleared(master: int) -> None:
+    bench = Bench(ROBSTRIDE)
+    bench.enter()
+    for node, faults in ((NODE + 1, 0x10), (NODE, 0)):  # another drive's, and none
+        bench.hear(master, codec.encode_faults(node, faults))
+        assert bench.answer().closed_loop
+    bench.axis.request_supply()
+    assert bench.sent[-1] == Frame(NODE, bytes.fromhex("ffffffffffff00fb"))
+    bench.hear(master, codec.encode_faults(NODE, 1 << 2))
+    assert not bench.answer().closed_loop
+    assert bench.axis.health.active_errors == "under-voltage" and bench.axis.health.power_cut
+    bench.axis.clear_errors()
+    assert bench.last == codec.CLEAR
+    bench.hear(master, codec.encode_faults(NODE, 0))
+    assert not bench.answer().closed_loop and not bench.axis.health.active_errors
 
 
 def test_another_program_that_stops_a_cubemars_is_believed() -> None:

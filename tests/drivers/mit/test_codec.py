@@ -55,7 +55,27 @@ def test_the_ranges_are_those_of_the_libraries() -> None:
         velocity_rad_s = 45.0 if name == "AK60-6" else table["V_max"]  # the makers' manual V1.0.8, page 50
         assert MODELS[name][:3] == (table["P_max"], velocity_rad_s, table["T_max"])
         assert not MODELS[name].has_registers
-    assert set(MODELS) == set(DAMIAO) | set(tables)
+    robstrides = {name for name, model in MODELS.items() if model.reports_faults_apart}
+    assert set(MODELS) == set(DAMIAO) | set(tables) | robstrides
+
+
+def test_a_robstride_answers_with_a_wide_temperature_and_tells_its_faults_apart() -> None:
+    """Bytes by section 6 of the User Manuals: half of each range at 37.5 °C; two faults, one, none, an unknown one."""
+    ranges = MODELS["RS00"]
+    answer = codec.decode_answer(bytes.fromhex("05 c000 c00c 00 0177"), ranges)
+    assert answer.node_id == 5 and (answer.temperature_c, answer.last) == (37.5, 0)
+    assert answer.position_rad == pytest.approx(0.5 * 12.57, abs=1e-3)
+    assert answer.velocity_rad_s == pytest.approx(0.5 * 33.0, abs=0.025)
+    assert answer.torque_nm == pytest.approx(0.5 * 14.0, abs=0.01)
+    assert codec.encode_answer(answer, ranges) == bytes.fromhex("05 c000 c00c 00 0177")
+    for temperature_c in (0.0, 25.6, 145.0):
+        given = codec.encode_answer(answer._replace(temperature_c=temperature_c), ranges)
+        assert codec.decode_answer(given, ranges).temperature_c == temperature_c and not codec.is_faults(given)
+    told = bytes.fromhex("05 0140 0000 000000")  # bits 0 and 14
+    assert codec.is_faults(told) and codec.error_text(codec.decode_faults(told)) == "over-temperature"
+    assert codec.decode_faults(bytes.fromhex("05 0000 0100 000000")) == 2  # bit 16, over-current
+    assert codec.decode_faults(bytes.fromhex("05 0000 0000 000000")) == 0
+    assert codec.error_text(codec.decode_faults(bytes.fromhex("05 0000 0080 000000")))  # a bit without a name
 
 
 def test_the_other_commands_are_those_of_the_library() -> None:

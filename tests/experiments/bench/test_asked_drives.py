@@ -17,7 +17,7 @@ from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
 from simulation.harness.lockstep import drives_of
 
-DAMIAO, CUBEMARS = "mit", "mit:AK80-9"
+DAMIAO, CUBEMARS, ROBSTRIDE = "mit", "mit:AK80-9", "mit:RS05"
 
 
 def test_rig_of(drive: str, **changes: Any) -> TestRig:
@@ -33,7 +33,7 @@ def wrong(readings: list[BenchReading]) -> list[str]:
     return [reading.what for reading in readings if not reading.good]
 
 
-@pytest.mark.parametrize("drive", [DAMIAO, CUBEMARS])
+@pytest.mark.parametrize("drive", [DAMIAO, CUBEMARS, ROBSTRIDE])
 def test_watchdogs_that_cannot_be_observed_are_measured(drive: str) -> None:
     rig = test_rig_of(drive)
     readings = [*check_firmware(rig), *check_watchdogs(rig), *check_watchdog_times(rig)]
@@ -44,7 +44,7 @@ def test_watchdogs_that_cannot_be_observed_are_measured(drive: str) -> None:
     assert left_out == (set() if drive == DAMIAO else set(rig.configuration.rig.joints))
 
 
-@pytest.mark.parametrize("drive", [DAMIAO, CUBEMARS])
+@pytest.mark.parametrize("drive", [DAMIAO, CUBEMARS, ROBSTRIDE])
 def test_a_watchdog_that_is_off_is_found(drive: str) -> None:
     rig = test_rig_of(drive, watchdog_s=0.0)
     if drive == DAMIAO:  # stage 1 ends the bench
@@ -85,6 +85,7 @@ def test_damping_brakes_a_fast_sweep_of_drives_whose_answers_are_a_tick_old(driv
         ("moteus", 0.0),
         (DAMIAO, 0.0),
         (CUBEMARS, 0.0),
+        (ROBSTRIDE, 0.0),
         (CUBEMARS, 25.64),  # of a V2, where the model's 50 is configured
         (CUBEMARS, 65.0),
         ("mit:AK60-6", 50.0),

@@ -13,7 +13,7 @@ from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
 
 TICK_S = 0.0026
-TYPES = (*DRIVE_TYPES, "mit:AK80-9")
+TYPES = (*DRIVE_TYPES, "mit:AK80-9", "mit:RS05")
 CONSTANT_NM_A = 0.083
 
 
