@@ -126,7 +126,7 @@ class OdriveSetup(AskedSetup):
         return (
             exactly(f"{CAN}.node_id", drive.node_id, "node_id", "it answers under this id"),
             *(_period(name, 2.0) for name in ("encoder", "iq")),
-            exactly(f"{CAN}.heartbeat_msg_rate_ms", 1e3 * drive.heartbeat_period_s, "heartbeat_period_s"),
+            exactly(f"{CAN}.heartbeat_msg_rate_ms", round(1e3 * drive.heartbeat_period_s), "heartbeat_period_s"),
             *(_period(name, 100.0) for name in ("error", "temperature", "bus_voltage")),
             watchdog(TIMEOUT, self._longest_watchdog_s),
             exactly(ENABLE, 1.0, GUIDE),

@@ -57,6 +57,15 @@ def test_one_joint_alone_is_changed(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert not bench.buses["right"].sent
 
 
+def test_a_period_is_written_as_the_whole_milliseconds_that_an_odrive_has(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = make_bench(folder, monkeypatch, "odrive")
+    bench.change("[drive.left_sweep]", "[drive.left_sweep]\nheartbeat_period_s = 0.0333")
+    ended = run("drives", "setup", "left_sweep", "--config", str(bench.config), "--write", "--backup", "old.toml")
+    assert ended.returncode == exit_codes.OK, ended.stdout
+
+
 def test_a_backup_is_never_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench(folder, monkeypatch, "odrive")
     (folder / "old.toml").write_text("precious", encoding="utf-8")
