@@ -126,7 +126,7 @@ def _listen(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     listener.setblocking(False)
     try:
-        if path.is_socket():  # left by an earlier process; bind refuses any other file
+        if path.is_socket() and not _has_reader(path):  # left by an earlier process; bind refuses any other file
             path.unlink()
         listener.bind(str(path))
         os.chmod(path, SOCKET_MODE)
@@ -134,6 +134,13 @@ def _listen(path: Path) -> socket.socket:
         listener.close()
         raise PoseSourceError(f"the pose socket {path} cannot be opened: {problem.strerror}") from None
     return listener
+
+
+def _has_reader(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe, contextlib.suppress(ConnectionRefusedError):
+        probe.connect(str(path))
+        return True
+    return False
 
 
 class PoseSender:

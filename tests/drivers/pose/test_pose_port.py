@@ -104,3 +104,10 @@ def test_the_report_says_whether_poses_arrive(port: PosePort, sender: PoseSender
     assert port.report()[1:5] == (1, 1, 0, "")
     port.read(1.0 + 2.0 * STALE_S)
     assert "any more" in port.report().trouble and port.report().what_to_do
+
+
+def test_the_socket_of_another_daemon_is_not_taken_away(port: PosePort, sender: PoseSender, path: Path) -> None:
+    with pytest.raises(PoseSourceError, match="Address already in use"):
+        PosePort(path)
+    sender.send(0.0, 0.1)
+    assert port.read(1.0).x_m == 0.1
