@@ -32,7 +32,7 @@ class Blocks(IntEnum):
 
 
 class Clears(Enum):
-    """What ends a fault that occurred while torque was on. While torque is off, a fault ends with its cause."""
+    """What ends a fault that occurred while torque was on, or that `latches_idle`. Any other one ends with its cause."""
 
     WHEN_GONE = "when its cause has been gone for a while"
     BY_HAND = "by 'mudskipper clear', once its cause is gone"
@@ -409,7 +409,7 @@ class FaultKind(StrEnum):
     )
     LOOP_LAGGING = (
         "loop_lagging", "loop", SOFT_STOP, ALWAYS, WHEN_GONE, 101,
-        "The loop missed six ticks in a row, or a tenth of a hundred.", "The loop lags: {extent}.", BUSY,
+        "The loop missed five ticks in a row, or a tenth of a hundred.", "The loop lags: {extent}.", BUSY,
     )
     LOOP_CRAWLING = (
         "loop_crawling", "loop", DRIVES_IDLE, ALWAYS, BY_HAND, 25,

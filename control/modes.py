@@ -186,5 +186,6 @@ def refusal(mode: Mode, request: Request, health: Health) -> Refusal | None:
     }.get(request, False)
     if not prevented:
         return None
-    faults = health.blocking or ((health.worst,) if health.worst else ())
+    blocking = health.blocking if request is Request.ARM else ()
+    faults = blocking or ((health.worst,) if health.worst else ())
     return Refusal(mode if faults else Mode.BOOT, request, faults)

@@ -149,7 +149,7 @@ class GaitTarget(NamedTuple):
     stride: int
     sweep_rad: float
     sweep_velocity_rad_s: float
-    depth_m: float  # of the flipper's lowest point below the mud's nominal surface; negative above it
+    depth_m: float  # of the lower edge's middle below the mud's nominal surface; negative above it
     depth_velocity_m_s: float
 
 

@@ -262,7 +262,7 @@ class JointMonitor:
 
     def _watch_heat(self, found: list[Fault], facts: TickFacts, state: DriveState, torque_nm: float) -> None:
         measured_c = state.temperature_c
-        self._hot_s = self._hot_s + facts.dt_s if self._nearly_hot_c <= measured_c else 0.0
+        self._hot_s = self._hot_s + min(facts.dt_s, MOST_SEEN_S) if self._nearly_hot_c <= measured_c else 0.0
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # more is no measurement

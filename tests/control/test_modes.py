@@ -191,7 +191,9 @@ def test_a_refusal_names_its_cause() -> None:
     blocked = WELL._replace(blocking=(OF_REACTION[Reaction.NONE], OF_REACTION[Reaction.WARN]))
     assert refusal(Mode.IDLE, Request.ARM, blocked) == Refusal(Mode.IDLE, Request.ARM, blocked.blocking)
     held = (OF_REACTION[Reaction.HOLD],)
-    assert refusal(Mode.HOLD, Request.WALK, faulty(Reaction.HOLD)) == Refusal(Mode.HOLD, Request.WALK, held)
+    for health in (WELL, blocked):  # what only prevents arming was overruled then
+        refused = refusal(Mode.HOLD, Request.WALK, faulty(Reaction.HOLD, health))
+        assert refused == Refusal(Mode.HOLD, Request.WALK, held)
 
 
 def test_before_all_drives_are_heard_a_refusal_is_that_of_boot() -> None:

@@ -62,7 +62,7 @@ def pushed(torque_nm: float, **changes: Any) -> Changes:
         ("voltage_low", {"bus_voltage_v": 19.9}, {"dt_s": 0.03}, 6),  # exactly its time is no fault
         ("voltage_under", {"bus_voltage_v": 17.9}, {"dt_s": 0.03}, 6),
         ("motor_overheating", {"temperature_c": 80.0}, {}, 58),
-        ("motor_overheating", {"temperature_c": 80.0}, {"dt_s": 0.075}, 3),
+        ("motor_overheating", {"temperature_c": 80.0}, {"dt_s": 0.03}, 6),
         ("motor_hot", {"temperature_c": 90.0}, {}, 58),
         ("joint_position", {"angle_rad": nextafter(MARGIN_RAD, inf)}, {}, 1),
         ("joint_position", {"angle_rad": nextafter(-MARGIN_RAD, -inf)}, {}, 1),
@@ -349,6 +349,12 @@ def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_th
         faults = faults_of(monitor, healthy(temperature_c=measured_c))
     assert [fault.name for fault in faults] == [name][: bool(name)]
     assert not faults or dict(faults[0].values)["temperature_c"] == pytest.approx(expected_c, abs=0.01)
+
+
+def test_one_hot_message_after_a_gap_is_no_fault_and_heats_no_winding() -> None:
+    monitor = make_monitor()
+    assert names_of(monitor, healthy(temperature_c=200.0), dt_s=0.5) == set()
+    assert names_of(monitor, healthy()) == set()
 
 
 @pytest.mark.parametrize("absurd_c", [inf, 1e38])
