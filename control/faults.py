@@ -32,7 +32,7 @@ class Blocks(IntEnum):
 
 
 class Clears(Enum):
-    """What ends a fault that occurred while torque was on, or that `latches_idle`. Any other one ends with its cause."""
+    """What ends a fault that occurred with torque on, or that `latches_idle`. Any other one ends with its cause."""
 
     WHEN_GONE = "when its cause has been gone for a while"
     BY_HAND = "by 'mudskipper clear', once its cause is gone"

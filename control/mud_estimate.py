@@ -1,6 +1,6 @@
 """The estimate of the mud between strides: each coefficient with its standard error and its depth law.
 
-The coefficients of control/plate stand for forces that grow with the depth squared (k_s) or with the submerged
+The coefficients of plate_integrals.py stand for forces that grow with the depth squared (k_s) or with the submerged
 volume (k_p, k_e). Mud's forces grow more slowly, so the same mud reads softer in a deeper stride: by the clay practice
 of Matlock (1970) k_s at 5 cm is a third lower than at 3 cm. Near the depth z₀ of the strides it came from, k ∝ z^m.
 The exponent is learned too, and its error grows with the distance of the prediction from z₀:

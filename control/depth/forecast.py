@@ -1,7 +1,7 @@
 """Forecast of a stride at another depth, on the safe side: what thrust the mud withstands, and the extraction torque.
 
-The mud of one flipper withstands f_x = k_s(z) ∫ζ dA in the middle of the sweep (control/plate). Mud that yielded gives
-a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both depend on the one
+The mud of one flipper withstands f_x = k_s(z) ∫ζ dA in the middle of the sweep (plate_integrals.py). Mud that yielded
+gives a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both depend on the one
 strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N mud, 1.8 cm), and
 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the ratio starts
 between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The larger of

@@ -11,9 +11,13 @@ class FaultBounds:
     """The bounds of faults that depend on the machine. T is the loop's period of 2.63 ms."""
 
     late_s: Annotated[float, Bounds(0.003, 2.0), Meaning("without position or current: reported")] = 0.0053  # 2 T
-    quiet_s: Annotated[float, Bounds(0.005, 2.0), Meaning("without position or current: damping")] = 0.0079  # 3 T
+    quiet_s: Annotated[float, Bounds(0.005, 2.0), Meaning("without position: damping; without current alone: hold")] = (
+        0.0079  # 3 T
+    )
     silence_s: Annotated[
-        float, Bounds(0.005, 2.0), Meaning("without position or current: drives idle; of the loop itself: damping")
+        float,
+        Bounds(0.005, 2.0),
+        Meaning("without position: drives idle; without current alone: soft stop; of the loop itself: damping"),
     ] = 0.0263  # 10 T
     jump_rad: Annotated[
         float, Bounds(0.01, 10.0), Meaning("of a position beyond what a joint can do: noise, late stamps")
@@ -30,6 +34,6 @@ class FaultBounds:
     voltage_low_v: Annotated[float, Bounds(0.0, 100.0), Meaning("supply below this is reported; 0: never")] = 20.0
     voltage_min_v: Annotated[float, Bounds(0.0, 100.0), Meaning("supply below this: soft stop; 0: never")] = 18.0
     disk_free_fraction: Annotated[
-        float, Bounds(0.0, 0.9), Meaning("of the log's disk, below which nothing is armed")
+        float, Bounds(0.0, 0.9), Meaning("of the log's disk, below which nothing is armed without --force disk_low")
     ] = 0.05
     disk_slow_s: Annotated[float, Bounds(0.05, 60.0), Meaning("for one write of the log: reported")] = 2.0

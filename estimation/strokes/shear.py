@@ -35,7 +35,7 @@ SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
 QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
-CLIPPED = 0.3  # of the samples of a stance: the mean force is then that of the motor within a few percent
+CLIPPED = 0.3  # of a stance's samples, in saturated batches: the mean force is that of the motor within a few percent
 DEEP_FRACTION = 0.7  # of the deepest part of a path
 MOTOR, BODY = "limited_by_motor", "limited_by_body"
 

@@ -4,7 +4,7 @@
     extraction    τ₂ - cross-coupling = -k_e Φ        over the last three quarters of the rise
 
 Φ is the moment of the submerged volume in each pose, and the cross-coupling is the adduction torque of the load across
-the plate's face, which the sweep joint measures (both in control/plate). Each piece of the travel counts by its
+the plate's face, which the sweep joint measures (both in plate_integrals.py). Each piece of the travel counts by its
 length within these limits, unless the adduction joint has no vertical lever there. Over the first quarter of the rise
 the mud's force on the plate reverses from supporting it to holding it down.
 """
@@ -35,8 +35,8 @@ TORQUE_CONSTANT_UNCERTAINTY = 0.032  # of a motor without a calibration: as the 
 # of the cross-coupling. The drop bounds its lever: the load's centre lies between the lower edge and the middle of the
 # wet part, 35 to 50 mm below the arm at a depth of 3 cm (10 %), and the drop itself is known to 2 mm (5 %).
 CROSS_COUPLING_UNCERTAINTY = 0.12
-LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
-HELD_BATCHES = 3  # in a row, 6 mm of rise, that must withstand a bound
+LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 82 % interval reaches zero
+HELD_BATCHES = 3  # in a row, 3 mm of rise, that must withstand a bound
 BATCHES_PER_UNIT = 10  # of bounded work
 SIDE_YIELDS = 0.2  # of the plate's thickness: Matlock's 4 times 2.5 ε b, with ε = 0.02 of soft clay
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"

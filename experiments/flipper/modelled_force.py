@@ -1,7 +1,7 @@
 """The forces that the fitted coefficients predict, for comparison with the measured forces.
 
-The default method's laws (control/plate) are about the torques of the joints: τ₂ = k_p Φ in insertion, τ₁ = k_s Ψ in
-stance, τ₂ = -k_e Φ in extraction, with the cross-coupled load on the plate's face added to τ₂. The law's torque
+The default method's laws (plate_integrals.py) are about the torques of the joints: τ₂ = k_p Φ in insertion, τ₁ = k_s Ψ
+in stance, τ₂ = -k_e Φ in extraction, with the cross-coupled load on the plate's face added to τ₂. The law's torque
 replaces the measured one, the other joint's stays as measured, and both go through the same map from torques to forces
 as the measurement. The paper's laws are about the forces themselves: f_z = k_p A z, f_x = k_s b z²/2, f_z = -k_e A z.
 Each law is evaluated where its coefficient is fitted: in insertion below the surface, in stance after 2.5 cm of sweep,

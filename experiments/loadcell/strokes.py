@@ -7,7 +7,7 @@ paper's section II-E:
     k_e    the same for the last three quarters of the way up, with the force downward
     k_s    F = k ∫ζ dA at the set depth, with F the mean over the second half of the travel
 
-V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate). Forces are
+V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (plate_integrals.py). Forces are
 corrected to the set speed of the stage, to which a coefficient belongs. The standard error of one trial contains those
 of speed, surface and samples. The misfit of the law is not part of it, since another trial leaves the same.
 """

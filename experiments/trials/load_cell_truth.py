@@ -2,7 +2,7 @@
 
 Insertion and extraction follow the flipper's own arc, with a cell in the joint that does not feel the plate's face
 (simulation/test_rig); shear goes sideways at the stance's mean attitude; all to the same depth and at the same speed.
-The coefficients are fitted by the laws of control/plate: τ = k Φ for insertion and for the last three quarters of
+The coefficients are fitted by the laws of plate_integrals.py: τ = k Φ for insertion and for the last three quarters of
 the way up, and F = k_s ∫ζ dA for shear. The second set is of the paper's plate (section II-E), upright and moved
 straight, with F = k V. (A leaning plate that is pushed straight down is neither: its face carries a part of the load,
 one lean stands for a growing one, and the cell reads 4 % more k_p at 3 cm, 13 % at 4 cm, 31 % at 5 cm. Along the arc it

@@ -2,9 +2,9 @@
 
 A stage that pushes a leaning plate straight down presses its face through the mud, and part of that load points up:
 nothing in 2 cm of clay, a seventh of the whole at 5 cm. A flipper's plate moves down along an arc on which it leans
-more and more, and the load on its face is no part of k_p and k_e (control/plate). So here the joint turns the plate
-at one sweep angle, with one speed of its lower edge and in equal steps of depth, and the cell reads the moment of all
-forces within the plate's plane. The contact model is the same as under the robot.
+more and more, and the load on its face is no part of k_p and k_e (plate_integrals.py). So here the joint turns the
+plate at one sweep angle, with one speed of its lower edge and in equal steps of depth, and the cell reads the moment of
+all forces within the plate's plane. The contact model is the same as under the robot.
 """
 
 from math import degrees, hypot

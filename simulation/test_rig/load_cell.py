@@ -24,7 +24,7 @@ from simulation.mud.rigid_plate import Attitude, Twist, lowest_point_m
 STEP_S = 0.0005
 
 
-# depth, submerged volume and upward force in the order of time; of a joint's cell Φ (control/plate) and the moment
+# depth, submerged volume and upward force in the order of time; of a joint's cell Φ (plate_integrals.py) and the moment
 Curve = list[tuple[float, float, float]]
 
 

@@ -1,6 +1,6 @@
 """Synthetic muds, strides and estimates for the tests of the choice of depth, and the plate in numpy.
 
-The plate is summed over small pieces here, without the formulas of control/plate.
+The plate is summed over small pieces here, without the formulas of plate_integrals.py.
 """
 
 from collections.abc import Sequence

@@ -1,10 +1,10 @@
 """Strokes through synthetic mud that keeps the estimator's own laws, so that the truth is known to the last digit.
 
-The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate on the true surface, the
-load on the plate's face, gravity, inertia, friction and clinging mud. Without noise only two errors remain: strokes are
-averaged over pieces of travel, and the surface has to be found first. The law bends a line of force against depth by 3
-% at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which looks like a surface that is too
-deep. Tests that need the laws without this error state the surface beforehand.
+The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of plate_integrals.py on the true surface,
+the load on the plate's face, gravity, inertia, friction and clinging mud. Without noise only two errors remain: strokes
+are averaged over pieces of travel, and the surface has to be found first. The law bends a line of force against depth
+by 3 % at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which looks like a surface that
+is too deep. Tests that need the laws without this error state the surface beforehand.
 """
 
 from collections.abc import Iterable, Sequence
