@@ -25,7 +25,7 @@ targets fades out without a jump of position or velocity.
 """
 
 from collections.abc import Sequence
-from math import copysign, cos, fsum, radians, sin
+from math import copysign, cos, fsum, inf, radians, sin
 
 from control.gait.gait import RAMP_S
 from control.gait.joint_path import Gap, still, with_gaps
@@ -79,9 +79,9 @@ class Recovery:
         self._quickest_s = swing_duration_s(gait, geometry)
         self.reset()
 
-    def reset(self, swing_s: float | None = None) -> None:
-        """Forget the attempts; `swing_s` is the duration of the swings that follow, if it is not the configured one."""
-        swing_s = self._quickest_s if swing_s is None else swing_s
+    def reset(self, swing_s: float = inf) -> None:
+        """Forget the attempts; `swing_s` is the duration of the next swing. Those after it may be as quick as any."""
+        swing_s = min(swing_s, self._quickest_s)
         self._fade_s = same_for_each(swing_s, min(RISE_S, swing_s), self.rig)
         self.attempt = 0  # under way; 0: none
         self.given_up: Sequence[str] = ()  # flippers that the last attempt has not freed

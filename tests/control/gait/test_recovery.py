@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import groupby, pairwise
 from math import copysign, cos, degrees, nan, radians, sin
@@ -363,6 +364,17 @@ def test_the_swing_after_a_recovery_ends_where_every_swing_ends_and_is_soon_clea
     assert swing
     for moment in swing[round(0.2 / PERIOD_S) :]:
         assert lowest_point_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m
+
+
+def test_a_method_that_swings_faster_than_the_ordered_gait_begins_its_insertion_without_a_gap() -> None:
+    quick, free = replace(GAIT, swing_duration_s=0.3), until_attempt(1)
+    robot = SyntheticRobot(lambda robot: free(robot) if robot.controller.gait.stride else (), gait=quick)
+    robot.controller.order = WalkOrder(DEPTH_M, gait=GAIT)
+    robot.walk(1.0).controller.gait.next_parameters = quick
+    robot.walk(7.0)
+    first = next(moment for moment in robot.moments if moment.target.stride == 2)
+    assert robot.events
+    assert first.joints == robot.controller._follow(first.target)
 
 
 # when a flipper is out
