@@ -21,9 +21,10 @@ a belt moves alone, up to three times as easily as its joint, and then hits it: 
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
 cross 1 degree, and without the last three of a stroke, which may end before the hit. What is left may vary too little
 to show a gain, so the single blocks must agree. A sweep that the mud lets go of is thrown through that play, so no
-block counts that is faster than any path. A thrown sweep is braked while mud may still push its flipper, as a weak
-motor would brake it, so the later half of each stroke must show a weak motor by itself. One stride proves a gain beyond
-a factor of 2, three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+block counts that is faster than any path. A thrown sweep is braked from the beginning, while mud may still push its
+flipper: it brakes as one with a weak motor would, so a sweep is too weak only if its stroke without these blocks says
+the same. One stride proves a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the
+inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -95,25 +96,25 @@ class Moments(NamedTuple):
 
 
 class Stride(NamedTuple):
-    """The moments of a stride's blocks, of its joined blocks, which a rotor in its play does not change, and of the
-    later halves of its strokes, which mud that lets go does not change.
+    """The moments of a stride's blocks, of its joined blocks, which a rotor in its play does not change, and of those
+    after a joint that the mud has thrown is no longer braked.
     """
 
     blocks: Moments = Moments()
     joined: Moments = Moments()
-    later: Moments = Moments()
+    driven: Moments = Moments()
 
     def plus(self, other: "Stride") -> "Stride":
-        blocks, joined, later = self
-        return Stride(blocks.plus(other.blocks), joined.plus(other.joined), later.plus(other.later))
+        blocks, joined, driven = self
+        return Stride(blocks.plus(other.blocks), joined.plus(other.joined), driven.plus(other.driven))
 
     def gain_beyond(self, factor: float) -> float | None:
         """Return the gain, if it is certainly beyond this factor or its inverse."""
-        blocks, joined, later = self
+        blocks, joined, driven = self
         if joined.is_line and joined.um > factor * joined.uu and blocks.um > factor * blocks.uu:
             return joined.gain
-        is_weak = factor * blocks.mm < blocks.um and factor * later.mm < later.um
-        return blocks.gain if blocks.is_line and is_weak else None
+        is_weak = all(each.is_line and factor * each.mm < each.um for each in (blocks, driven))
+        return blocks.gain if is_weak else None
 
 
 class JointStrokes:
@@ -125,6 +126,7 @@ class JointStrokes:
         self.friction = None if friction == NO_FRICTION else friction
         self._joins = joins
         self._stroke: list[Block] = []
+        self._braked = 0  # blocks at its beginning: the mud has thrown the joint
         self._stride = Stride()
         self._strides: deque[Stride] = deque(maxlen=STRIDES)
 
@@ -139,14 +141,20 @@ class JointStrokes:
             self.end_stroke()
             return
         if max(abs(first_rad_s), abs(last_rad_s)) > FAST_RAD_S:
-            self._stroke.clear()
+            self._clear_stroke()
             return
         if elapsed_s <= 0.0:
             return
         moving_nm = self.inertia_kg_m2 * (last_rad_s - first_rad_s) / elapsed_s - gravity_nm
         if self.friction is not None:
             moving_nm += self.friction.torque_nm(state.angle_rad, (first_rad_s + last_rad_s) / 2.0)
+        if self._joins > 1 and torque_nm * last_rad_s < 0.0 and self._braked == len(self._stroke):
+            self._braked += 1
         self._stroke.append((torque_nm, moving_nm))
+
+    def _clear_stroke(self) -> None:
+        self._stroke.clear()
+        self._braked = 0
 
     def end_stroke(self) -> None:
         blocks, joins = self._stroke, self._joins
@@ -154,11 +162,10 @@ class JointStrokes:
             crossed = blocks[:-joins] if joins > 1 else blocks  # in the last ones a rotor may still be in its play
             rows = zip(*[iter(crossed)] * joins, strict=False)
             joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
-            later = blocks[len(blocks) // 2 :] if joins > 1 else blocks  # an insertion in air is short
-            self._stride = self._stride.plus(
-                Stride(Moments.of(blocks), Moments.of(joined) if joined else Moments(), Moments.of(later))
-            )
-        blocks.clear()
+            whole, driven = Moments.of(blocks), blocks[self._braked :]
+            without = whole if not self._braked else Moments.of(driven) if driven else Moments()
+            self._stride = self._stride.plus(Stride(whole, Moments.of(joined) if joined else Moments(), without))
+        self._clear_stroke()
 
     def end_stride(self) -> Stride:
         """Return the moments of the stride, and begin the next one."""

@@ -88,12 +88,13 @@ def test_a_line_through_joined_blocks_that_hardly_vary_is_chance() -> None:
     assert joined.is_line and Stride(blocks, joined).gain_beyond(FACTOR_OF_ONE) is None
 
 
-@pytest.mark.parametrize(("gain", "is_wrong"), [(1.0, False), (0.4, True)])
+@pytest.mark.parametrize(("thrown", "gain", "is_wrong"), [(True, 1.0, False), (False, 1.0, False), (False, 0.4, True)])
 def test_a_thrown_sweep_that_the_mud_still_pushes_while_it_is_braked_is_no_weak_motor(
-    gain: float, is_wrong: bool
+    thrown: bool, gain: float, is_wrong: bool
 ) -> None:
-    """Blocks of a simulated swing of a body that has sunk: torque and motion, mN·m; without most of its plateau."""
-    thrown = [(-168.5, -46.0), (-83.5, -16.1), (-22.8, 13.9), (3.0, 10.6), (16.6, -0.1), (41.2, 3.0), (55.2, 4.1)]
+    """Torque and motion in mN·m of simulated swings of a body that has sunk; without most of their plateau."""
+    pushed = [(-168.5, -46.0), (-83.5, -16.1), (-22.8, 13.9), (3.0, 10.6), (16.6, -0.1), (41.2, 3.0), (55.2, 4.1)]
+    driven = [(73.8, 25.8), (66.7, 18.2), (47.9, -2.1)]
     plateau = [
         (63.5, 7.1),
         (59.6, 10.1),
@@ -114,11 +115,11 @@ def test_a_thrown_sweep_that_the_mud_still_pushes_while_it_is_braked_is_no_weak_
         (36.6, -12.2),
         (29.6, -20.7),
     ]
-    speed_rad_s, speeds = 5.0, [5.0]
-    for _, motion_mnm in thrown + plateau + braking:
-        speed_rad_s += motion_mnm / 1e3 / INERTIA_KG_M2 * BLOCK_TICKS * PERIOD_S
-        speeds.append(speed_rad_s)
-    stride = stride_of(speeds, [torque_mnm / gain / 1e3 for torque_mnm, _ in thrown + plateau + braking])
+    blocks = (pushed if thrown else driven) + plateau + braking
+    speeds = [5.0]
+    for _, motion_mnm in blocks:
+        speeds.append(speeds[-1] + motion_mnm / 1e3 / INERTIA_KG_M2 * BLOCK_TICKS * PERIOD_S)
+    stride = stride_of(speeds, [torque_mnm / gain / 1e3 for torque_mnm, _ in blocks])
     assert (stride.gain_beyond(FACTOR_OF_ONE) is not None) == is_wrong
 
 
