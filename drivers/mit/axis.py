@@ -19,13 +19,13 @@ from drivers.answering_axis import AnsweringAxis
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
 from drivers.mit import codec
+from drivers.mit.gate_table import gate_table
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import FLOAT, SUPPLY_V, MitSettings
 from drivers.setpoint_monitor import TOLERANCE_NM, SetpointMonitor
 
 MASTER_ID = 0  # under which older CubeMars answer, all of a bus, and RobStrides as their manual has it
 TURN_RAD = 2.0 * pi
-HARMLESS = frozenset({codec.LEAVE, codec.CLEAR, codec.FAULT_QUESTION})  # commands that any program may send
 
 
 class MitAxis(AnsweringAxis):
@@ -43,6 +43,7 @@ class MitAxis(AnsweringAxis):
         self._supply_request = Frame(codec.REGISTER_ID, codec.encode_read(parameters.node_id, SUPPLY_V))
         self._zero_rad = TURN_RAD * parameters.zero_turn
         self._amperes_per_nm = self._sign / parameters.reported_constant_nm_a
+        self._harmless = gate_table(parameters).always[parameters.node_id]  # to this model, from any program
         self.settings = MitSettings(parameters)
         self.reset()
 
@@ -132,7 +133,7 @@ class MitAxis(AnsweringAxis):
         self._on_question()
         if data == codec.LEAVE:
             self._following = False
-        if data not in HARMLESS:
+        if data not in self._harmless:
             self._count_foreign_command()
 
     def _receive_foreign_register(self, data: bytes, now_s: float) -> None:

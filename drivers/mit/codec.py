@@ -27,7 +27,7 @@ from drivers.mit.models import TORQUE_CODES, Model
 ANSWER_BYTES = 8
 _SPECIAL = b"\xff" * 7
 ENTER, LEAVE, SET_ZERO, CLEAR = (_SPECIAL + bytes([last]) for last in (0xFC, 0xFD, 0xFE, 0xFB))
-FAULT_QUESTION = b"\xff" * 6 + b"\x00\xfb"  # to a RobStride, and no command
+FAULT_QUESTION = b"\xff" * 6 + b"\x00\xfb"  # to a RobStride; to other makers' drives a command with full gains
 ROBSTRIDE_MASTER = 0xFD  # the id under which a RobStride answers, where it is not 0
 _PURE_TORQUE = bytes.fromhex("8000 8000 0000")  # codes of zero position and velocity; kp and kd exactly 0
 ZERO_CODE = (TORQUE_CODES + 1) // 2
@@ -78,7 +78,7 @@ class Answer(NamedTuple):
 
 
 def feedback_id(node_id: int, model: Model) -> int:
-    """Return the id under which a drive answers: a CubeMars its own; a Damiao as the set-up page sets MST_ID."""
+    """Return the id under which a drive answers: a CubeMars its own; Damiao and RobStride as the set-up page says."""
     if model.reports_faults_apart:
         return ROBSTRIDE_MASTER
     return node_id + 16 if model.has_registers else node_id

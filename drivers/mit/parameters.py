@@ -88,7 +88,7 @@ class MitParameters(DriveParameters):
         if proof.date and not is_date(proof.date):
             yield f"proven_watchdog.date = {proof.date!r}", "must be a date such as 2026-11-24"
             return
-        if not proof.watchdog_s:
+        if not proof.watchdog_s or self.model not in MODELS:
             return
         if self.reports_settings:
             yield f"proven_watchdog.watchdog_s = {proof.watchdog_s:g}", f"must be 0: a {self.model} reports its own"

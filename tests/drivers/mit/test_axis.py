@@ -1,6 +1,7 @@
 """One MIT motor as a joint: what its answers mean, when it follows torque, and which commands are another program's."""
 
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -129,13 +130,19 @@ def test_a_damiao_that_left_the_mode_is_not_commanded_back_into_it() -> None:
 
 @pytest.mark.parametrize(
     ("data", "foreign"),
-    [(codec.LEAVE, 0), (codec.CLEAR, 0), (codec.ENTER, 1), (codec.SET_ZERO, 1), (codec.encode_torque(0.1, 18.0), 1)],
+    [
+        (codec.LEAVE, {DAMIAO: 0, CUBEMARS: 0, ROBSTRIDE: 0}),
+        (codec.CLEAR, {DAMIAO: 0, CUBEMARS: 1, ROBSTRIDE: 0}),
+        (codec.FAULT_QUESTION, {DAMIAO: 1, CUBEMARS: 1, ROBSTRIDE: 0}),  # to the first two a command with full gains
+        *((data, {DAMIAO: 1, CUBEMARS: 1, ROBSTRIDE: 1}) for data in (codec.ENTER, codec.SET_ZERO)),
+        (codec.encode_torque(0.1, 18.0), {DAMIAO: 1, CUBEMARS: 1, ROBSTRIDE: 1}),
+    ],
 )
-def test_only_commands_that_stop_a_drive_are_anybody_s(data: bytes, foreign: int) -> None:
-    for model in (DAMIAO, CUBEMARS):
+def test_only_commands_that_stop_a_drive_are_anybody_s(data: bytes, foreign: Mapping[str, int]) -> None:
+    for model, counted in foreign.items():
         bench = Bench(model)
         bench.hear(NODE, data)
-        assert bench.axis.health.foreign_commands == foreign
+        assert bench.axis.health.foreign_commands == counted
 
 
 @pytest.mark.parametrize("master", [0, 0xFD])

@@ -75,6 +75,9 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"', [
         "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
     ]),
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"\nproven_watchdog = { watchdog_s = 0.3 }', [
+        "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
+    ]),
     ("node_id = 0", 'node_id = 16\ntype = "mit"', ["drive.left_sweep.node_id = 16: must be at most 15"]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nvelocity_range_rad_s = 0.0', [
         "drive.left_sweep.velocity_range_rad_s = 0: must be 1 to 500, or -1 for that of the model"
