@@ -71,7 +71,7 @@ class Drives:
         self._idling_lost = False  # the bus refused a command to idle, even if the drives report idle
 
     def poll(self) -> None:
-        """Ask the drives that report only when asked; the others are asked nothing. `send` asks them as well."""
+        """Ask the drives for what they report only when asked. `send` asks them as well."""
         for axis in self.axes:
             axis.poll()
 

@@ -1,4 +1,4 @@
-"""The transmit gate, the only path from the program to the drives: it passes only the frames that its tables list.
+"""The transmit gate, the only path from the loop to the drives: it passes only the frames that its tables list.
 
 Each drive has a table in the bytes of its protocol: payloads that may always leave (idle, the configured limits, the
 reading of a parameter), payloads that may leave while the gate is open (following torque), and how a torque command is

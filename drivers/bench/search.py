@@ -38,7 +38,7 @@ def search(
     chosen: Collection[str] = (),
     show: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> SearchResult:
-    """Ask in the order of `benches`; protocols that are `chosen` alone, and then in any case."""
+    """Ask in the order of `benches`; protocols that are `chosen` alone, and then also next to others."""
     found: list[FoundDrive] = []
     not_asked: dict[str, str] = {}
     asked = {name: bench for name, bench in benches.items() if name in chosen or not chosen}
