@@ -57,7 +57,7 @@ class OdriveSettings:
                 return b"", parameters
             if opcode == SDO_WRITE:
                 (value,) = layout.unpack_from(data, codec.SDO_HEAD_BYTES)
-                parameters = self._write(key, float(value), parameters)
+                parameters = self._write(key, value, parameters)
         except (MalformedMessageError, KeyError):
             return b"", parameters
         value = self._value(key, parameters)

@@ -31,6 +31,7 @@ from drivers.odrive.codec import (
 )
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.odrive.device import SimulatedOdrive
+from simulation.devices.odrive.settings import ENDPOINTS
 
 NODE = 3
 CONSTANT_NM_A = 0.083
@@ -177,6 +178,15 @@ def test_commands_that_are_too_short_and_of_no_number_change_nothing(message: Me
 def test_a_supply_outside_of_its_levels_trips_the_drive(volts: float, flag: int) -> None:
     drive = make_armed_drive(bus_voltage_v=volts)
     assert (torque_nm(drive, 0.25) == 0.0) is bool(flag) and ask(drive, GET_ERROR) == (flag, flag)
+
+
+def test_it_answers_under_a_node_id_that_another_program_writes() -> None:
+    drive = make_drive()
+    (answer,) = drive.receive(
+        Frame(arbitration_id(NODE, RX_SDO), RX_SDO.encode(1, ENDPOINTS["axis0.config.can.node_id"], 0) + b"\5\0\0\0"),
+        0.0,
+    )
+    assert answer.arbitration_id >> 5 == 5 and drive.receive(Frame(5 << 5, is_remote=True), 0.0)
 
 
 def reported_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
