@@ -96,10 +96,11 @@ def _causes_in(episode: list[Begun], bus_of: Mapping[str, str]) -> list[LoggedCa
 
 
 def _logged(cause: Cause, episode: list[Begun]) -> LoggedCause:
-    roots = [begun for begun in episode if begun.fault.kind is cause.root.kind]
+    own = [each.fault for each in cause.faults]
+    roots = [begun for begun in episode if begun.fault in own]
     return LoggedCause(
         first_s=roots[0].stamp_s,
-        times=max(1, sum(begun.fault == cause.root for begun in roots)),
+        times=sum(begun.fault == cause.root for begun in roots),
         name=cause.root.name,
         subjects=tuple(sorted(each.fault.subject for each in cause.faults)),
         message=roots[0].message,

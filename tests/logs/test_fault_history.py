@@ -49,6 +49,14 @@ def test_faults_that_were_never_present_together_do_not_follow_from_each_other()
     assert together.name == "bus_off" and together.consequences == ("drive_silent",)
 
 
+def test_a_cause_has_time_and_message_of_its_own_faults_and_not_of_a_consequence_of_the_same_kind() -> None:
+    bus, left = "fault bus_off (damping): The left bus is off.", "fault drive_silent (damping): The left_sweep drive."
+    right = left.replace("left", "right")
+    (_, silent) = read_causes(events(bus, left, right, "over: drive_silent right_sweep", right), TEXT)
+    assert (silent.first_s, silent.subjects, silent.times) == (12.0, ("right_sweep",), 2)
+    assert silent.message == "The right_sweep drive."
+
+
 def test_what_a_drive_reports_soon_after_its_start_was_no_fault() -> None:
     unknown, over = "fault watchdog_unknown (none): The left_sweep drive.", "over: watchdog_unknown left_sweep"
     heard = "mode boot to idle"
