@@ -7,6 +7,7 @@ groups of their own, `walk 15.6N`, because a walking robot does not repeat a str
 
 import re
 from collections.abc import Sequence
+from filecmp import cmp
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
@@ -36,12 +37,18 @@ def parse_rule(text: str) -> GroupRule:
 
 
 def find_logs(folders: Sequence[Path]) -> list[Paths]:
-    """Return the logs in folders and the folders below them; segments of one run are one log. Also accepts files."""
+    """Return the logs in folders and the folders below them; segments of one run are one log. Also accepts files.
+
+    A copy under the same name, such as the one in a report's folder, is left out: it would count as a repetition.
+    """
     found: dict[Path, Path] = {}
     for folder in folders:
         files = sorted(folder.rglob("*")) if folder.is_dir() else [folder]
         found |= {path.resolve(): path for path in files if path.is_file() and path.name.endswith(ENDINGS)}
-    paths = list(found.values())
+    paths: list[Path] = []
+    for path in sorted(found.values(), key=lambda each: len(each.parts)):  # of two copies the one higher up stays
+        if not any(path.name == other.name and cmp(path, other, shallow=False) for other in paths):
+            paths.append(path)
     runs: dict[Path, list[Path]] = {}
     for path in paths:
         runs.setdefault(_first_segment(path, paths), []).append(path)

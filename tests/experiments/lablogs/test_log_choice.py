@@ -56,3 +56,10 @@ def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_o
         (below / name if name.startswith("two") else below.parent / name).touch()
     found = find_logs([tmp_path, below, tmp_path / "a" / "one.csv"])
     assert sorted([path.name for path in paths] for paths in found) == runs
+
+
+def test_a_copy_in_the_folder_of_a_report_is_no_repetition_and_another_log_of_the_name_is_one(tmp_path: Path) -> None:
+    for folder, text in (("report", "1"), ("other", "2"), ("", "1")):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        (tmp_path / folder / "one.csv").write_text(text, encoding="utf-8")
+    assert find_logs([tmp_path]) == [(tmp_path / "one.csv",), (tmp_path / "other" / "one.csv",)]
