@@ -37,7 +37,8 @@ SOUND = ("whole", "export", "copy", BEING_WRITTEN)
 
 LEGEND = (
     "unfinished: cut off; broken: damaged, or left by a recovery that did not end.\n"
-    "'mudskipper log recover' repairs what it can; remove files that it cannot repair, and those that are no logs"
+    "'mudskipper log recover' repairs what it can in active/, and 'log recover FILE' a broken one anywhere; remove "
+    "files that it cannot repair, and those that are no logs"
 )
 
 

@@ -54,7 +54,7 @@ def _require_finished(path: Path) -> None:
     if summary is None and is_being_written(path):
         raise LogError(f"{path}: still being written, which viewers refuse: 'mudskipper live' shows it meanwhile")
     if summary is None:
-        raise LogError(f"{path}: not a finished log, which viewers refuse: 'mudskipper log recover' repairs it")
+        raise LogError(f"{path}: not a finished log, which viewers refuse: 'mudskipper log recover FILE' repairs it")
 
 
 def _start(program: str | None, arguments: Sequence[str], advice: str) -> int:

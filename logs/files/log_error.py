@@ -6,7 +6,7 @@ from collections.abc import Callable
 from mcap.exceptions import McapError
 
 DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # raised by damaged bytes
-ADVICE = "'mudskipper log recover' saves its readable rows"
+ADVICE = "'mudskipper log recover FILE' saves its readable rows"
 Watch = Callable[[str, int, int], None]  # called with the work, how much of it is done, and how much there is
 
 

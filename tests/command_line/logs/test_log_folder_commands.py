@@ -72,6 +72,14 @@ def test_recovery_of_a_folder_skips_logs_that_are_being_written(folder: Path) ->
     living.finish()
 
 
+def test_a_finished_log_that_broke_is_recovered_by_its_name_as_the_listing_says(folder: Path) -> None:
+    broken = folder / DONE / "1.mcap"
+    broken.write_bytes(broken.read_bytes()[:-100])
+    assert "'log recover FILE'" in output("log", "list", str(folder))
+    assert broken.name not in output("log", "recover", str(folder))
+    assert json_of("log", "recover", str(broken))["recovered"][0]["rows"] == 381
+
+
 def test_several_logs_are_preserved_even_if_one_fails(folder: Path) -> None:
     make_log(folder, "3.mcap").finish()
     names = [str(folder / place / name) for place, name in ((ACTIVE, "2.mcap"), (DONE, "1.mcap"), (DONE, "3.mcap"))]
