@@ -20,7 +20,7 @@ from logs.files.tick_array import in_groups
 from logs.files.whole_files import whole_files
 from logs.flat_columns import Column, flat_columns, stack_rows
 
-ROWS_PER_GROUP = 1 << 14  # of a table: six megabytes of ticks, of which the writer needs several copies
+ROWS_PER_GROUP = 1 << 14  # of a table: seven megabytes of ticks, of which the writer needs several copies
 TIME_INDEX = {  # as pandas writes it: https://pandas.pydata.org/docs/development/developer.html
     "index_columns": ["time"],
     "column_indexes": [],

@@ -70,7 +70,7 @@ class OpenedLog:
 def open_log(path: Paths, fields: Sequence[str] = ()) -> OpenedLog:
     """Read an MCAP log, or several segments of one run. Raises LogError.
 
-    `ticks` has all fields of a tick, or only `fields`: an hour of all takes 500 MB, of each number 11 MB.
+    `ticks` has all fields of a tick, or only `fields`: an hour of all takes 600 MB, of each number 11 MB.
     """
     paths = _as_paths(path)
     log = read_logs(paths, fields=fields)

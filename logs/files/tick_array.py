@@ -15,7 +15,7 @@ from firmware_host.log.schema import FORMAT_OF, RowKind
 
 Ticks: TypeAlias = NDArray[np.void]
 
-BLOCK_ROWS = 4096  # at least, except in the last block: one and a half megabytes
+BLOCK_ROWS = 4096  # at least, except in the last block: 1.8 megabytes
 
 
 def tick_type(kind: RowKind = TICK) -> np.dtype[np.void]:
