@@ -44,10 +44,11 @@ def stack_rows(rows: Sequence[Mapping[str, Any]], kind: RowKind) -> NDArray[np.v
 
 
 def flat_columns(rows: NDArray[np.void], kind: RowKind, wall_offset_ns: int | None = None) -> list[Column]:
-    """Return the columns in the order of the fields; with the offset of the wall clock, `time` comes first."""
-    time = [] if wall_offset_ns is None else [Column("time", "", WALL_CLOCK, _wall_times(rows, wall_offset_ns), {})]
+    """Return the columns in the order of the fields; with stamps and the wall clock's offset, `time` comes first."""
+    names, time = rows.dtype.names or (), list[Column]()
+    if wall_offset_ns is not None and "stamp_s" in names:
+        time = [Column("time", "", WALL_CLOCK, _wall_times(rows, wall_offset_ns), {})]
     known = {field.name: field for field in kind.fields}
-    names = rows.dtype.names or ()
     return time + [column for name in names for column in _columns_of(known.get(name, Field(name, "")), rows[name])]
 
 

@@ -71,6 +71,12 @@ def test_selected_rows_become_a_table_too_with_their_time(log: mudskipper.Opened
     assert str(frame.index[0])[:19] == "2026-11-22 14:50:22" and str(frame.index.tz) == "UTC"
 
 
+def test_fields_without_the_stamp_become_a_table_with_numbered_rows(log: mudskipper.OpenedLog) -> None:
+    for chosen in (mudskipper.open_log(LOG, fields=["mode", "stride"]).ticks, log.ticks[["mode", "stride"]]):
+        frame = chosen.to_pandas()
+        assert [*frame.columns] == ["mode", "stride"] and frame.index[-1] == len(log.ticks) - 1
+
+
 def test_a_column_is_a_plain_array(log: mudskipper.OpenedLog) -> None:
     assert type(log.ticks["stamp_s"]) is type(log.ticks["angle_rad"]) is np.ndarray
 
