@@ -4,7 +4,7 @@ Within a row the speed rises and falls as half a cosine, so joint velocities are
 (except for a phase that ends early, which stops within a tick).
 """
 
-from math import cos, fsum, pi, radians, sin
+from math import cos, degrees, fsum, pi, radians, sin
 from typing import NamedTuple
 
 from control.gait.stride_table import stride_table
@@ -189,4 +189,5 @@ class Gait:
         if sweep_gap_rad or depth_gap_m:
             sweep_rad, depth_m = sweep_rad + sweep_gap_rad * (1.0 - fraction), depth_m + depth_gap_m * (1.0 - fraction)
             sweep_rad_s, depth_m_s = sweep_rad_s - sweep_gap_rad * rate, depth_m_s - depth_gap_m * rate
+            depth_m = min(depth_m, self.geometry.deepest_m(degrees(sweep_rad)))  # a path that nobody could check
         return GaitTarget(row.phase, self.stride, sweep_rad, sweep_rad_s, depth_m, depth_m_s)

@@ -10,7 +10,7 @@ from control.gait.gait import Gait
 from control.gait.stride_table import crutching_parameters, stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
-from control.parameters.gait_path import GaitPath, WayPoint
+from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
 from control.rate import PERIOD_S
 from control.records import GaitTarget, Phase
 from estimation.stride_clock import STROKES
@@ -74,6 +74,17 @@ def test_only_pure_phases_in_order_keep_their_names_for_the_estimator() -> None:
     assert reported["backward"] == reported["walking"] == [*STROKES, Phase.SWING]
     assert reported["ellipse"] == [Phase.STROKE, Phase.SWING]
     assert Phase.INSERTION not in reported["slow_insertion"]
+
+
+def test_a_phase_after_one_that_ended_early_stays_within_reach() -> None:
+    lines = GaitPhase("insertion", (WayPoint(-30.0, depth_m=0.03), WayPoint(40.0, depth_m=0.01)), speed_m_s=0.1)
+    arc = GaitPhase("stance", (WayPoint(-20.0, depth_m=0.037), WayPoint(-5.0, depth_m=0.026)), "half_ellipse", 0.1)
+    gait = started(GaitPath((lines, arc, *load("walking").phase[-2:])))
+    while gait.step(PERIOD_S).depth_m < 0.029:
+        pass
+    assert gait.end_phase()
+    for target in targets(gait, 1000):
+        assert GEOMETRY.is_reachable(target.sweep_rad, target.depth_m - 1e-9)
 
 
 def test_one_phase_that_is_not_pure_makes_strokes_of_all() -> None:
