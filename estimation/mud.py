@@ -87,7 +87,7 @@ class MudEstimator:
         self._commands_s = NO_COMMANDS
         self._closed.clear()
         self.map.reset()
-        self.mud_estimate = NOTHING_KNOWN
+        self.mud_estimate, self.felt_strides = NOTHING_KNOWN, ()
 
     def fits_of(self, flipper: str) -> StrideFits:
         """Return the fits of the flipper's last stride, until its next insertion ends."""

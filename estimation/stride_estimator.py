@@ -57,12 +57,9 @@ class StrideEstimator(ABC):
         self.work = WorkQueue() if work is None else work
         self.flipper = flipper
         self.geometry = geometry
-        self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
-        self.lift = 0.0  # uncertainty of ln k_p because the insertion of that stride may have lifted the body
         self._loads = JointLoads(geometry, drive, motion)
         self._clock = StrideClock()
         self._motion = PathMotion()
-        self._is_path = False  # the samples are those of a path that does all strokes at once
         self.reset()
 
     def reset(self) -> None:
@@ -70,6 +67,9 @@ class StrideEstimator(ABC):
         self._loads.reset()
         self._clock.reset()
         self._motion.reset()
+        self._is_path = False  # the samples are those of a path that does all strokes at once
+        self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
+        self.lift = 0.0  # uncertainty of ln k_p because the insertion of that stride may have lifted the body
         self.load = NO_LOAD
         self._body_at_close_m = UNKNOWN
         self._begin_stride(0.0, UNKNOWN)

@@ -1,7 +1,7 @@
 """The sum of floats, rounded once, which is the same number in every version of Python.
 
 The built-in `sum` compensates its rounding from Python 3.12 on and does not before, so that the last digit of a
-coefficient depended on the interpreter. tests/test_same_digits.py refuses it where a coefficient is computed.
+coefficient depended on the interpreter. tests/estimation/test_same_digits.py refuses it where one is computed.
 """
 
 from collections.abc import Iterable

@@ -19,6 +19,7 @@ from estimation.mud import PAPER_DRAG_N, MudEstimator, MudReading
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import recorded_states
+from estimation.strokes.fit_samples import NO_FITS
 from estimation.strokes.shear import Base
 from tests.estimation.synthetic_strides import DRIVE, GEOMETRY, K_P, WEIGHTLESS, Row, stride_samples
 from tests.estimation.synthetic_strides import update as update_one
@@ -180,6 +181,7 @@ def test_a_reset_forgets_strides_estimate_and_map(method: Method) -> None:
     assert mud_estimate != NOTHING_KNOWN and rows
     mud.reset()
     assert mud.mud_estimate == NOTHING_KNOWN
-    assert mud.map.rows() == ()
+    assert not mud.map.rows() and not mud.felt_strides
+    assert mud.fits_of("left") == NO_FITS
     assert repr(strides_of(mud, walk(1), walk(2), speed_m_s=0.1)) == repr(first)
     assert (mud.mud_estimate, mud.map.rows()) == (mud_estimate, rows)
