@@ -116,7 +116,7 @@ def decode_answer(data: bytes, model: Model) -> Answer:
         raise MalformedMessageError(f"an answer of {len(data)} bytes")
     head, position, velocity, middle, torque, temperature, last = _ANSWER.unpack(data)
     if model.reports_faults_apart:
-        temperature, last = (temperature << 8 | last) / 10.0, 0
+        temperature, last = (((temperature << 8 | last) ^ 0x8000) - 0x8000) / 10.0, 0  # signed: mud may freeze
     return Answer(  # by position: it is built for every drive in every tick
         head & 0xF,
         head >> 4,
@@ -136,7 +136,7 @@ def encode_answer(answer: Answer, model: Model) -> bytes:
     head = answer.status << 4 | answer.node_id
     temperature, last = round(min(max(answer.temperature_c, 0.0), 255.0)), answer.last
     if model.reports_faults_apart:
-        temperature, last = divmod(round(min(max(answer.temperature_c, 0.0), 6553.5) * 10.0), 256)
+        temperature, last = divmod(round(answer.temperature_c * 10.0) & 0xFFFF, 256)
     return _ANSWER.pack(head, position, velocity >> 4, middle, torque & 0xFF, temperature, last)
 
 

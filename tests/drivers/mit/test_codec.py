@@ -68,7 +68,7 @@ def test_a_robstride_answers_with_a_wide_temperature_and_tells_its_faults_apart(
     assert answer.velocity_rad_s == pytest.approx(0.5 * 33.0, abs=0.025)
     assert answer.torque_nm == pytest.approx(0.5 * 14.0, abs=0.01)
     assert codec.encode_answer(answer, ranges) == bytes.fromhex("05 c000 c00c 00 0177")
-    for temperature_c in (0.0, 25.6, 145.0):
+    for temperature_c in (-12.5, 0.0, 25.6, 145.0):
         given = codec.encode_answer(answer._replace(temperature_c=temperature_c), ranges)
         assert codec.decode_answer(given, ranges).temperature_c == temperature_c and not codec.is_faults(given)
     told = bytes.fromhex("05 0140 0000 000000")  # bits 0 and 14
