@@ -77,13 +77,19 @@ def read_runs(
     for path in files:
         if not (path.suffix == ".mcap" or is_lab_csv(path)):
             raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
-        if any(path.absolute() == known.absolute() for run in runs.values() for known in run):
-            raise LogError(f"{path}: given twice")
+        for known in (known for run in runs.values() for known in run if _name_of(known) == _name_of(path)):
+            same = path.absolute() == known.absolute()
+            raise LogError(f"{path}: {'given twice' if same else f'has the name of {known}: rename one of them'}")
         log = None if is_lab_csv(path) else scan_log(path, watch)
         runs.setdefault((log and log.metadata.get("run_id")) or str(path), {})[path] = log
     joined = [(list(run), [log for log in run.values() if log]) for run in runs.values()]
     sources = [(paths, join_logs(paths, logs) if logs else None) for paths, logs in joined]
     return [_read_run(paths, log, layout, watch, vertical) for paths, log in sources]
+
+
+def _name_of(path: Path) -> str:
+    """Return what tells a run from others: its file's name without the ending."""
+    return path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap")
 
 
 def _read_run(
@@ -105,7 +111,7 @@ def _read_run(
     layout = _placed(path, layout, walks)
     strides = _describe_strides(walks, layout)
     return Run(
-        name=path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap"),
+        name=_name_of(path),
         paths=paths,
         robot=log.metadata.get("robot", "") if log else AUTHORS,
         log=log,

@@ -184,6 +184,9 @@ def test_logs_that_cannot_be_read_are_refused_by_name(log: Path) -> None:
 
 def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path) -> None:
     assert f"{log}: given twice" in failure("log", "report", str(log), str(log))
+    (log.parent / "other").mkdir()
+    other = str(shutil.copy(log, log.parent / "other"))
+    assert f"{other}: has the name of {log}" in failure("log", "report", str(log), other)
     (log.parent / "file").write_text("", encoding="utf-8")
     assert "Not a directory" in failure("log", "report", str(log), "--out", str(log.parent / "file" / "out"))
 
