@@ -50,7 +50,7 @@ class CatalogueError(LogError):
 
 
 class Answer(NamedTuple):
-    """The answer to a query."""
+    """The answer to a query; a name that comes again has a number."""
 
     names: list[str]
     rows: list[tuple[Any, ...]]
@@ -174,7 +174,9 @@ class Catalogue:
                     'a query is one SELECT on the tables logs and trials, such as "select file, strides from logs"'
                 )
             found = self._connection.execute(statements[0])
-            return Answer([column[0] for column in found.description or ()], found.fetchall())
+            names = [column[0] for column in found.description or ()]
+            counts = [names[:place].count(name) for place, name in enumerate(names)]
+            return Answer([name + f"_{n}" * bool(n) for name, n in zip(names, counts, strict=True)], found.fetchall())
         except duckdb.Error as problem:
             raise CatalogueError(f"the query is not understood: {_first_line(problem)}") from None
 

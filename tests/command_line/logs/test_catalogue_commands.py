@@ -39,6 +39,10 @@ def test_every_value_of_sql_has_its_json(folder: Path) -> None:
     assert row == {"a": None, "b": [None, 1.5], "d": {"c": ["2026-11-29"]}, "e": {"1": "0.50"}}
 
 
+def test_columns_of_one_name_are_all_answered(folder: Path) -> None:
+    assert json_of("log", "query", "select 1 as a, 2 as a, 3 as b", str(folder))["rows"] == [{"a": 1, "a_1": 2, "b": 3}]
+
+
 def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = catalogue_path(folder)
     duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
