@@ -147,10 +147,13 @@ def _misfits_n(trial: Entry, configuration: Configuration, method: str) -> dict[
 
 
 def _later_strokes(trials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[str, list[float]]:
-    """Compare each stride with the first one in the same hole: the mean ratio over the trials that have both."""
+    """Compare each stride with the first one in the same hole: the mean ratio over the trials with a value of both."""
     rows = [
         {"trial": trial, "number": number}
-        | {name: stride[name]["value"] if stride[name]["valid"] else nan for name in COEFFICIENTS}
+        | {
+            name: own["value"] if (own := stride[name])["valid"] and not own["at_least"] else nan
+            for name in COEFFICIENTS
+        }
         for trial, strides in enumerate(trials)
         for number, stride in enumerate(strides)
     ]

@@ -205,6 +205,8 @@ def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
     found = report(entries, ("47.6",))
     assert found["later_strokes"]["k_p"] == pytest.approx([0.8])
+    entries["47.6/1"]["strides"][DEFAULT][1]["k_p"]["at_least"] = True  # a bound is no value
+    assert report(entries, ("47.6",))["later_strokes"]["k_p"] == []
     assert found["muds"][0]["k_p"].value == 2e6
 
 
