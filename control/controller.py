@@ -124,7 +124,7 @@ class Controller:
 
     @property
     def walk_finished(self) -> bool:
-        """All ordered strides are complete."""
+        """All ordered strides are complete, those of the left flipper where the right one is later."""
         return 0 < self.order.strides <= self.target.stride
 
     @property
@@ -301,7 +301,7 @@ class Controller:
         """Return the gait's targets, or those of the recovery while flippers are stuck before the swing."""
         if self._later is not None:
             return self._targets_apart(dt_s, states, self._later)
-        stuck = self.recovery.stuck(states) if self.gait.swing_is_next else ()
+        stuck = self.recovery.stuck(states) if self.gait.swing_is_near else ()
         self.target = self.gait.step(dt_s, may_swing=not stuck)
         waits_for = stuck if self.gait.waits else ()
         targets = self.recovery.step(dt_s, waits_for, states, self._follow(self.target))
@@ -312,7 +312,7 @@ class Controller:
     def _targets_apart(self, dt_s: float, states: DriveStates, later: Gait) -> JointTargets:
         """Return the targets of flippers at different points of the gait: all stand still while one is stuck."""
         gaits = dict(zip(self.rig.flippers, (self.gait, later), strict=True))
-        stuck = [flipper for flipper in self.recovery.stuck(states) if gaits[flipper].swing_is_next]
+        stuck = [flipper for flipper in self.recovery.stuck(states) if gaits[flipper].swing_is_near]
         stands = any(gaits[flipper].waits for flipper in stuck)
         targets = [
             gait.step(0.0 if stands and flipper not in stuck else dt_s, flipper not in stuck)

@@ -13,6 +13,7 @@ from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath, GaitPhase
 from control.records import GaitTarget, Phase
 
+BRIEF_S = 0.01  # of a row that a step may begin and end: longer than any step
 RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase
 
 
@@ -90,7 +91,10 @@ class Gait:
     def _tabulate(self, depth_m: float) -> None:
         self.commanded_depth_m = depth_m  # of the stride under way
         self._rows = stride_table(self.path or self._aim, self.geometry, depth_m)
-        self._before_swing = next(i for i, row in enumerate(self._rows) if row.phase is Phase.SWING) - 1
+        self._before_swing = near = next(i for i, row in enumerate(self._rows) if row.phase is Phase.SWING) - 1
+        while near > 0 and self._rows[near].duration_s < BRIEF_S:
+            near -= 1
+        self._near_swing = near
 
     @property
     def start(self) -> tuple[float, float]:
@@ -101,6 +105,11 @@ class Gait:
     def swing_is_next(self) -> bool:
         """The swing follows the row under way, in which the flippers come out of the mud."""
         return self._row == self._before_swing
+
+    @property
+    def swing_is_near(self) -> bool:
+        """A step from the row under way may reach the swing."""
+        return self._near_swing <= self._row <= self._before_swing
 
     def is_choice_due(self, within_s: float, may_turn: bool) -> bool:
         """Return whether the next stride's depth must be set within this time, because the swing ends then.

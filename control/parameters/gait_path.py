@@ -52,5 +52,7 @@ class GaitPath:
         tuple[float, ...], Meaning("depth of every stride, or of the strides in turn; without it, as ordered")
     ] = ()
     right_offset_fraction: Annotated[
-        float, Bounds(0.0, 0.9), Meaning("of a stride by which the right flipper is later; 0 together, 0.5 alternating")
+        float,
+        Bounds(0.0, 0.9),
+        Meaning("of a stride by which the right flipper is later, as 0.5; a walk ends with the left one's last stride"),
     ] = 0.0

@@ -76,6 +76,16 @@ def test_only_pure_phases_in_order_keep_their_names_for_the_estimator() -> None:
     assert Phase.INSERTION not in reported["slow_insertion"]
 
 
+def test_no_step_reaches_a_swing_over_a_brief_row_before_anybody_looks_whether_the_flippers_are_out() -> None:
+    crutching = load("walking")
+    *before, extraction, swing = crutching.phase
+    brief = replace(extraction, way_points=(*extraction.way_points, WayPoint(-30.02, depth_fraction=-1.0)))
+    gait = started(replace(crutching, phase=(*before, brief, swing)))
+    for _ in range(600):
+        target = gait.step(3.0 * PERIOD_S, may_swing=not gait.swing_is_near)
+    assert gait.waits and target.phase is not Phase.SWING
+
+
 def test_a_phase_after_one_that_ended_early_stays_within_reach() -> None:
     lines = GaitPhase("insertion", (WayPoint(-30.0, depth_m=0.03), WayPoint(40.0, depth_m=0.01)), speed_m_s=0.1)
     arc = GaitPhase("stance", (WayPoint(-20.0, depth_m=0.037), WayPoint(-5.0, depth_m=0.026)), "half_ellipse", 0.1)
