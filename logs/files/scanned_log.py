@@ -122,9 +122,13 @@ def join_logs(paths: Sequence[Path], logs: Sequence[ScannedLog]) -> ScannedLog:
     tally = TickTally()
     for log in ordered:
         tally.add_after(log.tally)
-    one_trial = len({log.metadata.get(METADATA_KEY) for log in ordered}) == 1
+    metadata = dict(ordered[0].metadata)
+    if len({log.metadata.get(METADATA_KEY) for log in ordered}) > 1:
+        metadata.pop(METADATA_KEY, None)
+    if any(log.metadata.get("recovered") == "true" for log in ordered):
+        metadata["recovered"] = "true"
     return ordered[0]._replace(
-        metadata={key: value for key, value in ordered[0].metadata.items() if one_trial or key != METADATA_KEY},
+        metadata=metadata,
         strides=[stride for log in ordered for stride in log.strides],
         events=[event for log in ordered for event in log.events],
         complete=all(log.complete for log in ordered),

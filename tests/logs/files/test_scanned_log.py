@@ -17,6 +17,7 @@ from logs.files.log_error import LogError
 from logs.files.log_reader import read_logs
 from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_log, scan_logs
+from logs.recovery import recover_log
 from tests.firmware_host.synthetic_rows import encode_row
 
 TICKS = 3000
@@ -54,6 +55,14 @@ def test_blocks_are_the_ticks_in_the_order_of_their_numbers(tmp_path: Path, fart
     assert log.tally.farthest <= farthest and log.rows == len(numbers)
     if farthest < TICKS:  # no block waits for the end of the log
         assert max(map(len, blocks)) <= 2 * (300 + 180) + farthest
+
+
+def test_a_run_with_a_recovered_segment_was_recovered(tmp_path: Path) -> None:
+    paths = [write_ticks(tmp_path / f"run-{n}.mcap", [n], segment=n) for n in range(2)]
+    assert log_summary(scan_logs(paths))["recovered"] is False
+    paths[1].write_bytes(paths[1].read_bytes()[:-40])
+    recover_log(paths[1])
+    assert log_summary(scan_logs(paths))["recovered"] is True
 
 
 def test_segments_are_read_one_after_the_other_and_ticks_between_them_are_sorted(tmp_path: Path) -> None:
