@@ -11,7 +11,11 @@ class MotionParameters:
     """Parameters of motions outside the gait."""
 
     path_speed_rad_s: Annotated[
-        float, Bounds(0.05, 10.0), Meaning("mean speed of the joint with the longest way to a pose outside of the gait")
+        float,
+        Bounds(0.05, 10.0),
+        Meaning(
+            "mean speed of the joint with the longest way outside of the gait, also in a stop, which lasts 3 s at most"
+        ),
     ] = 1.0
     fade_in_s: Annotated[
         float, Bounds(0.0, 10.0), Meaning("in which stiffness rises to its full value after arming")
