@@ -6,7 +6,8 @@ tick commands a drive that is to be idle to leave the mode; a lost command is re
 
 A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
 without a fault after the command to enter, until a command to leave, also another program's, or a restart. So does a
-RobStride, which is asked for its faults in place of the supply.
+RobStride, which is asked for its faults in place of the supply. The question is a command with full gains to another
+maker's drive, so what has not answered it while idle is no RobStride and is not armed.
 drivers/answering_axis.py finds restarts and a second drive with this id. A command that arrives here comes from another
 program; one that does not, such as a command on the drive's serial line, shows in the torque that the answers measure.
 """
@@ -49,7 +50,8 @@ class MitAxis(AnsweringAxis):
 
     def reset(self) -> None:
         super().reset()
-        self._status = self._told_fault = 0  # the latter by a RobStride, when it was asked
+        self._status = 0
+        self._told_fault: int | None = None  # by a RobStride, when it was asked
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -90,7 +92,7 @@ class MitAxis(AnsweringAxis):
             return
         if self._ranges.reports_faults_apart and codec.is_faults(data):
             self._on_answer()
-            self._told_fault = codec.decode_faults(data)
+            self._told_fault, self._health = codec.decode_faults(data), None
         else:
             self._receive_answer(data, now_s)
 
@@ -113,7 +115,7 @@ class MitAxis(AnsweringAxis):
             faulty = answer.status not in (codec.DISABLED, codec.ENABLED)
             self._receive_status(answer.status, answer.status if faulty else 0)
         else:
-            fault = answer.fault or self._told_fault
+            fault = answer.fault or self._told_fault or 0
             follows = self._following and not fault
             self._receive_status(codec.ENABLED if follows else codec.DISABLED, fault)
         if self.closed_loop:
@@ -147,15 +149,17 @@ class MitAxis(AnsweringAxis):
 
     def _on_restart(self) -> None:
         super()._on_restart()
-        self._following, self._told_fault = False, 0
+        self._following, self._told_fault = False, None
 
     def _build_health(self) -> DriveHealth:
-        errors = codec.error_text(self._error_flags)
+        errors, apart = codec.error_text(self._error_flags), self._ranges.reports_faults_apart
+        question = "question for faults" if apart else "reading of register 14"
         return (
             super()
             ._build_health()
             ._replace(
-                supported_firmware="one that answers the reading of register 14",
+                firmware_supported=self.settings.supported and not (apart and self._told_fault is None),
+                supported_firmware=f"one that answers the {question}",
                 watchdog_advice=self.settings.watchdog_advice,
                 power_cut=self._error_flags in codec.UNDER_VOLTAGES,
                 watchdog_expired=self._error_flags == codec.LOST_COMMANDS,

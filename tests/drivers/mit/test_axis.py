@@ -150,8 +150,10 @@ def test_a_fault_that_a_robstride_tells_when_asked_ends_the_mode_until_it_is_cle
     bench = Bench(ROBSTRIDE)
     bench.enter()
     for node, faults in ((NODE + 1, 0x10), (NODE, 0)):  # another drive's, and none
+        assert not bench.axis.health.firmware_supported  # a drive of another maker would follow the question
         bench.hear(master, codec.encode_faults(node, faults))
         assert bench.answer().closed_loop
+    assert bench.axis.health.firmware_supported
     bench.axis.request_supply()
     assert bench.sent[-1] == Frame(NODE, bytes.fromhex("ffffffffffff00fb"))
     bench.hear(master, codec.encode_faults(NODE, 1 << 2))
