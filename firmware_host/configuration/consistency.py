@@ -188,8 +188,8 @@ def _depth_problems(configuration: Configuration) -> Iterator[str]:
     deepest_m = geometry.deepest_m(gait.sweep_angle_deg)
     if adaptation.max_depth_m > deepest_m:
         yield (
-            f"adaptation.max_depth_m = {adaptation.max_depth_m}: out of reach, must be at most {deepest_m:.4f}"
-            f" for this geometry and a sweep of ±{gait.sweep_angle_deg:g} degrees"
+            f"adaptation.max_depth_m = {adaptation.max_depth_m}: out of reach, must be at most"
+            f" {floor(1e4 * deepest_m) / 1e4:g} for this geometry and a sweep of ±{gait.sweep_angle_deg:g} degrees"
         )
     if not adaptation.min_depth_m <= adaptation.initial_depth_m <= adaptation.max_depth_m:
         yield (
@@ -212,8 +212,8 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
     lowest_deg = degrees(configuration.geometry.adduction_rad(radians(sweep_deg), depth_m))
     if limits.adduction_min_deg > lowest_deg:
         yield (
-            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
-            f" to reach adaptation.max_depth_m = {depth_m}"
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most"
+            f" {floor(10.0 * lowest_deg) / 10.0:g} to reach adaptation.max_depth_m = {depth_m}"
         )
 
 
@@ -238,8 +238,8 @@ def _sweep_problems(configuration: Configuration) -> Iterator[str]:
     lowest_deg = degrees(min(poses))
     if limits.adduction_min_deg > lowest_deg:
         yield (
-            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most {lowest_deg:.1f}"
-            " for adaptation.gait.min_sweep_deg to max_sweep_deg"
+            f"limits.adduction_min_deg = {limits.adduction_min_deg}: must be at most"
+            f" {floor(10.0 * lowest_deg) / 10.0:g} for adaptation.gait.min_sweep_deg to max_sweep_deg"
         )
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from control.computing.suggestion import suggestion
 from control.records import FLIPPERS
@@ -31,15 +32,20 @@ def rig_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def drive_problems(configuration: Configuration) -> Iterator[str]:
+    # two sections may share one channel
+    wires = {name: f"{bus.interface} {bus.channel} {bus.options}" for name, bus in configuration.bus.items()}
+    wired = {joint: replace(each, bus=wires.get(each.bus, each.bus)) for joint, each in configuration.drive.items()}
     joint_at: dict[tuple[str, int], str] = {}
     for joint, drive in configuration.drive.items():
         if drive.bus not in configuration.bus:
             yield f"drive.{joint}.bus = {drive.bus!r}: there is no such bus; {suggestion(drive.bus, configuration.bus)}"
         if drive.sign == 0:
             yield f"drive.{joint}.sign = 0: must be 1 or -1"
-        duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)
+        duplicate = joint_at.setdefault((wired[joint].bus, drive.node_id), joint)
         if duplicate != joint:
-            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
+            other = configuration.drive[duplicate].bus
+            shared = "" if other == drive.bus else ", the same channel"
+            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {other!r}{shared}"
         digits = drive.serial_digits
         if not re.fullmatch(f"([0-9a-f]{{{digits}}})?", drive.serial_number):
             must = f"must be {digits} hexadecimal digits in lower case" if digits else "must be empty: it reports none"
@@ -47,7 +53,7 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
         torque_problems = drive.torque_problems(configuration.limits.torque_nm)  # it would clamp without a report
         for value, problem in (*torque_problems, *drive.record_problems()):
             yield f"drive.{joint}.{value}: {problem}"
-    for first, second, identifier in collisions(configuration.drive):
+    for first, second, identifier in collisions(wired):
         one, other = configuration.drive[first], configuration.drive[second]
         if one.node_id != other.node_id:
             yield (

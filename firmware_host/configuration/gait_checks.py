@@ -7,7 +7,7 @@ of 49.5 % water is expected. The acceleration of body and arms is not in it: it 
 """
 
 from collections.abc import Iterator
-from math import cos, degrees, hypot, sin
+from math import cos, degrees, floor, hypot, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
@@ -115,7 +115,8 @@ def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud:
         low_deg, high_deg = limits.sweep_min_deg, limits.sweep_max_deg
         yield f"{where}: must be from {low_deg:g} to {high_deg:g} degrees, limits.sweep_min_deg and sweep_max_deg"
     if not geometry.is_reachable(sweep_rad, depth_m):
-        yield f"{where}: out of reach, must be at most {100.0 * geometry.deepest_m(sweep_deg):.2f} cm"
+        deepest_cm = floor(1e4 * geometry.deepest_m(sweep_deg)) / 100.0
+        yield f"{where}: out of reach, must be at most {deepest_cm:g} cm"
         return
     lift_rad = geometry.adduction_rad(sweep_rad, depth_m)
     lift_deg, low_deg, high_deg = degrees(lift_rad), limits.adduction_min_deg, limits.adduction_max_deg

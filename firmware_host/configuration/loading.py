@@ -4,6 +4,7 @@ A file is read in four steps: keys of version 0.1 get their present names, a gai
 each value is checked against its own bounds, and then the values are checked against each other.
 """
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -63,7 +64,7 @@ def load_configuration(path: Path) -> Configuration:
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
-    """Read a text; messages name its file. Raises ConfigurationError with all problems."""
+    """Read a text. Raises ConfigurationError with all problems; one about its syntax names the file."""
     return read_configuration(parse_document(text, file), text)
 
 
@@ -89,12 +90,17 @@ def _require_known_types(document: dict[str, Any]) -> None:
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
     known = tuple(DRIVE_TYPES)  # not the dictionary: a malformed type may not be hashable
     problems = [
-        f"drive.{joint}.type = {shown(name)}: there is no such type; {suggestion(str(name), known)}"
+        f"drive.{joint}.type = {shown(name)}: there is no such type; {_others(name, known)}"
         for joint, name in types.items()
         if name not in known
     ]
     if problems:
         raise ConfigurationError(problems)
+
+
+def _others(name: object, known: Iterable[str]) -> str:
+    """Return the suggestion for a word of the file, which may be no text."""
+    return suggestion(name if isinstance(name, str) else "", known)
 
 
 def _require_one_shape(document: dict[str, Any]) -> None:
@@ -116,6 +122,6 @@ def _apply_protocol(document: dict[str, Any]) -> None:
     name = gait.pop("protocol")
     if not isinstance(name, str) or name not in PROTOCOLS:
         raise ConfigurationError(
-            [f"gait.protocol = {name!r}: there is no such protocol; {suggestion(str(name), PROTOCOLS)}"]
+            [f"gait.protocol = {shown(name)}: there is no such protocol; {_others(name, PROTOCOLS)}"]
         )
     document["gait"] = asdict(PROTOCOLS[name]) | gait

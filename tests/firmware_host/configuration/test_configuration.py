@@ -154,7 +154,7 @@ def test_a_wrong_value_is_refused_by_its_key(example_text: str, old: str, new: s
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("max_depth_m", "0.06", "adaptation.max_depth_m = 0.06: out of reach, must be at most 0.0504"),
+        ("max_depth_m", "0.06", "adaptation.max_depth_m = 0.06: out of reach, must be at most 0.0503"),
         ("sweep_angle_deg", "35.0", "adaptation.max_depth_m = 0.05: out of reach"),
         ("initial_depth_m", "0.06", "adaptation.initial_depth_m = 0.06: must be from"),
         ("min_depth_m", "0.06", "adaptation.min_depth_m = 0.06: must be at most adaptation.max_depth_m"),
@@ -171,6 +171,28 @@ def test_drives_share_neither_a_missing_bus_nor_an_id() -> None:
     assert "drive.left_sweep.bus = 'a': there is no such bus; there is b" in missing
     twice = problems_of(minimal_text().replace("node_id = 3", "node_id = 2"))
     assert twice == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a'"]
+    two_sections = f'[bus.b]\ninterface = "virtual"\nchannel = "x"\n{minimal_text()}'.replace(
+        "node_id = 3", "node_id = 2"
+    )
+    before, _, after = two_sections.rpartition('bus = "a"')
+    shared = problems_of(f'{before}bus = "b"{after}')
+    assert shared == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a', the same channel"]
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"), [("adaptation", "max_depth_m", 0.2), ("limits", "adduction_min_deg", -5.0)]
+)
+def test_the_bound_that_a_message_gives_is_accepted(section: str, key: str, value: float) -> None:
+    (problem,) = problems_of(f"{minimal_text()}[{section}]\n{key} = {value}\n")
+    bound = re.search(r"must be at most (-?[\d.]+)", problem)
+    assert bound
+    assert getattr(getattr(parse_configuration(f"{minimal_text()}[{section}]\n{key} = {bound[1]}\n"), section), key)
+
+
+@pytest.mark.parametrize(("before", "key"), [("[drive.left_sweep]", "type"), ("[gait]", "protocol")])
+def test_a_word_that_is_a_number_beyond_all_size_is_refused(before: str, key: str) -> None:
+    text = f"{minimal_text()}[gait]\n".replace(before, f"{before}\n{key} = 0x{'f' * 6000}")
+    assert "beyond all size" in problems_of(text)[0]
 
 
 @pytest.mark.parametrize(
