@@ -22,7 +22,8 @@ DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
 LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
-SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
+SERVICE, LIVE_SERVICE = "mudskipper", "mudskipper-live"
+NETWORKD, WAIT_ONLINE = "systemd-networkd", "systemd-networkd-wait-online"
 SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"
 RULES = "etc/udev/rules.d/70-mudskipper-cpu.rules"
@@ -163,7 +164,7 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
     live = system.live
     if SYSUSERS in changed:
         yield system.command("systemd-sysusers")
-    if UNIT in changed and live:
+    if changed & {UNIT, LIVE_UNIT} and live:
         yield Command(("systemctl", "daemon-reload"))
     if changed & {LINK_FILE, RULES} and live:
         yield Command(("udevadm", "control", "--reload"))
@@ -183,18 +184,19 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
 def plan_removal(system: System, purge: bool) -> Plan:
     """Also removes files that were copied without this command, where they are unchanged."""
     root, plan, before = system.root, Plan([], []), _load_manifest(system.root)
-    query = ("systemctl", "is-active", SERVICE)
-    if system.is_enabled(SERVICE) or (system.live and system.run(query).text.strip() == "active"):
-        now = ("--now",) if system.live else ()
-        plan.steps.append(system.command("systemctl", "disable", *now, SERVICE))
+    for service in (SERVICE, LIVE_SERVICE):
+        query = ("systemctl", "is-active", service)
+        if system.is_enabled(service) or (system.live and system.run(query).text.strip() == "active"):
+            now = ("--now",) if system.live else ()
+            plan.steps.append(system.command("systemctl", "disable", *now, service))
     for path, text in load_sources(system.prefix).items():
         _plan_removal_of(plan, root / path, {_digest(text), before.get(path)}, purge)
     for link in LINKS:
         if (root / link).is_symlink() and (root / link).readlink() == _target(system, link):
             plan.steps.append(Remove(root / link))
     removed = {step.path for step in plan.steps if isinstance(step, Remove)}
-    for path, command in ((UNIT, ("systemctl", "daemon-reload")), (NETWORK, ("networkctl", "reload"))):
-        if system.live and root / path in removed:
+    for paths, command in (((UNIT, LIVE_UNIT), ("systemctl", "daemon-reload")), ((NETWORK,), ("networkctl", "reload"))):
+        if system.live and any(root / path in removed for path in paths):
             plan.steps.append(Command(command))
     if purge:
         plan.steps.extend(Remove(root / path) for path in OWNED if (root / path).exists())

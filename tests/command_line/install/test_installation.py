@@ -15,6 +15,7 @@ from command_line.install.installation import StepError, install, location_probl
 from command_line.install.service_plan import (
     CONFIGURATION,
     LINKS,
+    LIVE_UNIT,
     MANIFEST,
     NETWORK,
     SOURCES,
@@ -271,6 +272,16 @@ def test_a_purge_stops_the_service_first_and_removes_group_and_user_last(machine
     assert str(steps[0]) == "run systemctl disable --now mudskipper"
     assert [str(step) for step in steps[-2:]] == ["run groupdel mudskipper-view", "run userdel mudskipper"]
     assert Remove(machine.root / "etc/mudskipper") in steps
+
+
+def test_the_service_for_viewers_is_reloaded_when_it_changes_and_ended_when_it_goes(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.install()
+    machine.enabled.add("mudskipper-live")
+    assert "systemctl disable --now mudskipper-live" in commands(plan_removal(machine.system(), purge=False))
+    release(monkeypatch, LIVE_UNIT)
+    assert commands(plan_installation(machine.system())) == ["systemctl daemon-reload"]
 
 
 def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None:
