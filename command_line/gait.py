@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
+from command_line.errors import CommandError
 from command_line.screen import complain
 from command_line.shared_options import Seed
 from control.gait.stride_table import crutching_parameters, stride_table
@@ -85,17 +86,20 @@ def simulate(
 ) -> int:
     """Walk a gait in simulated mud, as fast as it computes; print the advance of each stride, what stuck and faults."""
     lockstep = Lockstep(_configuration(config), Track([(TRACK_M, MUDS[mud])]), seed, disturbances=TRACKWAY)
-    lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     try:
+        lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
         calls.methods["walk"]({"gait": as_json(gait_document(gait)), "strides": strides}, CALLER)
     except RefusedError as problem:
         raise ConfigurationError([str(problem)]) from None
+    except RuntimeError as problem:
+        raise CommandError(str(problem)) from None
     lockstep.run_until(lambda: lockstep.loop.target.stride >= 0, LONGEST_STRIDE_S)
     walked = [_stride(lockstep, stride) for stride in range(strides) if lockstep.loop.mode is Mode.WALKING]
     print(table([("stride", "cm", "s", "cm/s", "attempts to free a flipper"), *map(_cells, walked)]))
     advance_m, duration_s = sum(each["m"] for each in walked), sum(each["s"] for each in walked)
-    print(f"\n{100.0 * advance_m:.1f} cm in {duration_s:.1f} s, {100.0 * advance_m / duration_s:.2f} cm/s")
+    if walked:  # else a fault came before the first stride
+        print(f"\n{100.0 * advance_m:.1f} cm in {duration_s:.1f} s, {100.0 * advance_m / duration_s:.2f} cm/s")
     if fault := lockstep.loop.fault:
         complain(fault.message)
     return exit_codes.UNHEALTHY if fault else exit_codes.OK

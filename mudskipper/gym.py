@@ -41,7 +41,7 @@ ACTION = {  # its range by name; -1 and 1 of an action are the ends
     "sweep_angle_deg": (15.0, 35.0),
     "stance_speed_m_s": (0.2, 0.8),
 }
-OBSERVATION = (  # means of both flippers; 0 where nothing is known
+OBSERVATION = (  # means of both flippers; 0 where nothing is known, and an error of 1
     "k_p (N/cm³)", "k_s (N/cm³)", "k_e (N/cm³)", "error of k_p", "error of k_s", "error of k_e", "insertion force (N)",
     "stance force (N)", "extraction force (N)", "depth (cm)", "step (cm)", "stuck",
 )  # fmt: skip

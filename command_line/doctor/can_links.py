@@ -116,7 +116,9 @@ def examine_bus(
 def _examine_state(name: str, bus: BusParameters, link: CanLink) -> Finding:
     identity, wires = f"bus.{name}", "check plugs, termination (120 ohm at both ends) and that all share one bit rate"
     if not link.up:
-        return fail(identity, f"{link.name} is down", BRING_UP.format(link.name, bus.bit_rate_kbit_s))
+        command = BRING_UP_FD if bus.data_bit_rate_kbit_s else BRING_UP
+        fix = command.format(link.name, bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s)
+        return fail(identity, f"{link.name} is down", fix)
     if link.state in GOOD_STATES:
         return ok(identity, f"{link.name} ({link.kind or 'CAN'}) is up{', error-active' if link.state else ''}")
     level = Level.WARN if link.state == "ERROR-WARNING" else Level.FAIL

@@ -47,6 +47,7 @@ def find(
         buses = {name: each for name, each in configured.items() if name in (bus or configured)}
     with opened_buses(buses) as opened, watched() as show:
         results = [(each, each.search(type, show)) for each in opened]
+    drives = {joint: drive for joint, drive in drives.items() if not type or drive.type in type}
     reports = [_report(each, result, drives) for each, result in results]
     text = "\n\n".join("\n".join(_lines(report)) for report in reports)
     failed = any(report["problems"] or not report["drives"] for report in reports)

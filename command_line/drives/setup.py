@@ -40,6 +40,8 @@ def setup(
         Option("flat_endpoints.json of an ODrive's build (default: those next to the configuration)"),
     ] = (),
 ) -> int:
+    if restore and backup:
+        raise usage_error("--backup: must be left out with --restore, which writes the settings of its own file")
     if write and backup and backup.exists():
         raise usage_error(f"--backup {backup}: exists, and may have the only old settings; name another file")
     configuration = load_configuration(config)

@@ -82,6 +82,8 @@ def init(
     """Ask for what no option gives; without a terminal, or with `defaults`, the default is the answer."""
     if file != PRINTED and file.exists():
         raise usage_error(f"{file} exists: name another file, or move it away")
+    if fd and not from_bus:
+        raise usage_error("--fd belongs to --from-bus; without it --drive says whether the buses carry CAN FD")
     ask = asked_on_terminal if sys.stdin.isatty() and not defaults else unasked
     try:
         name = name or ask("name of the robot", NewRobot().name, str)

@@ -110,8 +110,9 @@ def _answer_of(law: Law, seen: Any) -> Any:
     try:
         return law(seen)
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's law
-        line = extract_tb(problem.__traceback__)[-1].lineno
-        raise LawError(f"the law raised {type(problem).__name__} in line {line}: {problem}") from problem
+        calls = extract_tb(problem.__traceback__)[1:]  # after the one above
+        own = [f" in line {call.lineno}" for call in calls if call.filename == calls[0].filename]
+        raise LawError(f"the law raised {type(problem).__name__}{''.join(own[-1:])}: {problem}") from problem
 
 
 def _give(client: StatusClient, method: str, order: Report, mode: str) -> None:

@@ -178,7 +178,8 @@ class Lockstep:
         self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(forced), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s, forced=forced)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
-            raise RuntimeError(refused or f"not armed: {self.loop.fault}")
+            fault = self.loop.fault
+            raise RuntimeError(refused or f"not armed: {fault.message if fault else self.loop.mode.name.lower()}")
 
     def walk(self, order: WalkOrder) -> None:
         """Start a walk. Raises RuntimeError where it is refused."""

@@ -49,6 +49,16 @@ def test_a_depth_that_the_daemon_refuses_is_refused_by_the_check_too(tmp_path: P
     assert "adaptation.max_depth_m" in found.stderr
 
 
+def test_a_robot_that_cannot_be_armed_walks_no_gait_and_says_why(tmp_path: Path) -> None:
+    robot = tmp_path / "robot.toml"
+    assert run("init", str(robot), "--defaults").returncode == exit_codes.OK
+    with robot.open("a", encoding="utf-8") as file:
+        file.write("\n[faults]\nvoltage_min_v = 50.0\nvoltage_low_v = 50.0\n")  # the simulated supply has 24 V
+    found = run("gait", "simulate", "walking", "--config", str(robot))
+    assert found.returncode == exit_codes.UNHEALTHY
+    assert "50" in found.stderr and "Traceback" not in found.stderr
+
+
 def test_a_gait_is_simulated_for_a_robot_that_is_not_calibrated_yet(tmp_path: Path) -> None:
     robot = str(tmp_path / "robot.toml")
     assert run("init", robot, "--defaults", "--flippers", "right", "--drive", "mit").returncode == exit_codes.OK

@@ -71,6 +71,8 @@ def test_an_interface_that_is_down_fails_with_the_command_that_brings_it_up() ->
     found = examine_bus("left", BusParameters("socketcan", "can1"), [], parse_links(UNTOUCHED))
     assert found[0].level is Level.FAIL and "ip link set can1 up type can bitrate 1000000" in found[0].fix
     assert {finding.id: finding.level for finding in found}["queue.left"] is Level.WARN
+    fd = examine_bus("left", BusParameters("socketcan", "can1", {}, 1000, 5000), [], parse_links(UNTOUCHED))
+    assert "dbitrate 5000000 fd on" in fd[0].fix
 
 
 @pytest.mark.parametrize(

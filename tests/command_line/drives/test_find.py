@@ -33,6 +33,14 @@ def test_a_drive_that_does_not_answer_is_a_failure(short_folder: Path, monkeypat
     assert "FAIL drive.left_sweep: type odrive, id 0: nothing answers" in ended.stdout
 
 
+def test_drives_of_a_type_that_was_not_asked_for_are_not_missed(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(short_folder, "odrive", monkeypatch)
+    ended = run("drives", "find", "--config", str(bench.config), "--type", "odrive05")
+    assert "no drive answers" in ended.stdout and "FAIL" not in ended.stdout
+
+
 def test_one_bus_can_be_searched_alone(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(short_folder, "odrive", monkeypatch)
     run("drives", "find", "--config", str(bench.config), "--bus", "right")

@@ -101,6 +101,7 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
     [
         ("return 1 / 0", ("ZeroDivisionError", "line 3")),
         ("raise SystemExit(0)", ("SystemExit", "line 3")),
+        ("return __import__('json').loads('')", ("JSONDecodeError", "line 3")),
         ("return 'deep'", ("'deep'",)),
         ("return {'depth_m': 0.03, 'method': 'disarm'}", ("'method'",)),
     ],
