@@ -9,6 +9,7 @@ from control.records import FLIPPERS
 from drivers.can.can_fd import CLASSIC_INTERFACES
 from drivers.drive_types import collisions, type_of
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.toml_records import shown
 
 
 def rig_problems(configuration: Configuration) -> Iterator[str]:
@@ -33,7 +34,7 @@ def rig_problems(configuration: Configuration) -> Iterator[str]:
 
 def drive_problems(configuration: Configuration) -> Iterator[str]:
     # two sections may share one channel
-    wires = {name: f"{bus.interface} {bus.channel} {bus.options}" for name, bus in configuration.bus.items()}
+    wires = {name: f"{bus.interface} {bus.channel} {shown(bus.options)}" for name, bus in configuration.bus.items()}
     wired = {joint: replace(each, bus=wires.get(each.bus, each.bus)) for joint, each in configuration.drive.items()}
     joint_at: dict[tuple[str, int], str] = {}
     for joint, drive in configuration.drive.items():
@@ -43,9 +44,9 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
             yield f"drive.{joint}.sign = 0: must be 1 or -1"
         duplicate = joint_at.setdefault((wired[joint].bus, drive.node_id), joint)
         if duplicate != joint:
-            other = configuration.drive[duplicate].bus
-            shared = "" if other == drive.bus else ", the same channel"
-            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {other!r}{shared}"
+            first_bus = configuration.drive[duplicate].bus
+            shared = "" if first_bus == drive.bus else ", the same channel"
+            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {first_bus!r}{shared}"
         digits = drive.serial_digits
         if not re.fullmatch(f"([0-9a-f]{{{digits}}})?", drive.serial_number):
             must = f"must be {digits} hexadecimal digits in lower case" if digits else "must be empty: it reports none"
