@@ -66,7 +66,7 @@ def changed(trial: Mapping[str, str], changes: Mapping[str, str]) -> Trial:
     """Return the trial with these keys; an empty value removes one. Raises ValueError with one sentence."""
     for key, value in changes.items():
         if not KEY.fullmatch(key):
-            raise ValueError(f"{key!r:.40} is no key: must be a lower-case letter, then at most 31 or digits or _")
+            raise ValueError(f"{key!r:.40} is no key: must be 1 to 32 lower-case letters, digits or _, a letter first")
         if len(value) > LONGEST_VALUE or not value.isprintable():
             raise ValueError(f"{key} = {value!r:.40}: must be at most {LONGEST_VALUE} printable characters")
         if key == "water" and value and not _is_water(value):
