@@ -228,12 +228,13 @@ class _Handler(BaseHTTPRequestHandler):
     def _text(self) -> str:
         """Return the text that was sent; one that the daemon would refuse as too long is cut off."""
         length = self.headers.get("Content-Length", "")
-        self.close_connection = True  # what is not read would be taken for the next request
         text = self.rfile.read(min(int(length), LONGEST_TEXT) if length.isdecimal() else 0)
         return text[:LONGEST_REQUEST].decode(errors="replace")
 
     def _refusal(self) -> str | None:
         """Return why this request is none of the own page; every route asks."""
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # what another site sends as a body would be taken for the next request
         arrived_at = str(self.connection.getsockname()[0])
         return self.server.own_page.refusal(self.headers.get("Host", ""), self.headers.get("Origin"), arrived_at)
 

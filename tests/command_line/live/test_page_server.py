@@ -1,8 +1,10 @@
 """The live page: rows reach every browser, however many there are, and no other page stops the robot."""
 
 import json
+import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from http.client import HTTPConnection
 from math import nan
 from pathlib import Path
@@ -122,6 +124,19 @@ def test_every_route_serves_the_own_page_alone(open_page: PageServer, host: str,
         response = connection.getresponse()
         assert (response.status == 200) == own and response.status in (200, REFUSED)
         connection.close()
+
+
+@pytest.mark.parametrize("length", ["Content-Length: {}", "Transfer-Encoding: chunked"])
+def test_the_body_of_another_site_s_request_is_no_request(page: PageServer, length: str) -> None:
+    hidden = f"POST /stop HTTP/1.1\r\nHost: {ADDRESS}\r\nX-Mudskipper: stop\r\nConnection: close\r\n\r\n"
+    head = f"POST /stop HTTP/1.1\r\nHost: {ADDRESS}\r\nOrigin: http://evil.example\r\n{length.format(len(hidden))}\r\n"
+    with socket.create_connection((ADDRESS, page.port), timeout=60) as connection:
+        connection.sendall(f"{head}\r\n{hidden}".encode())
+        answer = b""
+        with suppress(ConnectionResetError):
+            while piece := connection.recv(65536):
+                answer += piece
+    assert answer.count(b"HTTP/1.1") == 1 and f"HTTP/1.1 {REFUSED}".encode() in answer
 
 
 @pytest.mark.parametrize("headers", [{}, {"X_Mudskipper": "go"}], ids=str)
