@@ -56,6 +56,7 @@ TORQUE_ERROR = 0.03  # the standard deviation of a robot's torque constants
 PATCHES, DURATION_S = 6, 60.0
 FIRST_DEPTH_M = 0.02
 CM_PER_M, PER_JOULE, STUCK, FAULT = 100.0, 0.1, 5.0, 20.0
+NOTHING_FELT = [0.0] * 3 + [1.0] * 3 + [0.0] * 6  # no stride has closed yet
 LARGEST = 1000.0  # of any observation
 Array = NDArray[np.float32]
 
@@ -193,7 +194,7 @@ def _observation(stride: Stride) -> Array:
         felt += [each[f"{phase}_force_n"] or 0.0 for phase in ("insertion", "stance", "extraction")]
         felt += [CM_PER_M * (each["depth_m"] or 0.0), CM_PER_M * (each["step_m"] or 0.0), float(not each["released"])]
         flippers.append(felt)
-    means: Array = np.clip(np.mean(flippers, axis=0), -LARGEST, LARGEST).astype(np.float32)
+    means: Array = np.clip(np.mean(flippers or [NOTHING_FELT], axis=0), -LARGEST, LARGEST).astype(np.float32)
     return means
 
 

@@ -13,8 +13,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from mudskipper.client import Client
-from mudskipper.gym import ACTION, MudWalk
-from mudskipper.stride_walks import SimulatedWalk
+from mudskipper.gym import ACTION, MudWalk, _observation
+from mudskipper.stride_walks import SimulatedWalk, Stride
 from tests.folders import ROOT
 from tests.running_bench import Bench
 
@@ -46,6 +46,12 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
         assert over and not fault
         assert felt[9] == pytest.approx(2.75, abs=0.5)  # cm of depth: the middle of its range
         assert advanced_m == pytest.approx(info["body_m"] - begun_m) and advanced_m > 0.08
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_walk_that_ends_before_its_first_stride_is_observed_as_unknown() -> None:
+    felt = _observation(Stride([], 0.0, 1.0, 0.0, "holding", 0.0))
+    assert felt.tolist() == [0.0] * 3 + [1.0] * 3 + [0.0] * 6 and MudWalk().observation_space.contains(felt)
 
 
 def test_the_same_seed_gives_the_same_walk_and_another_seed_another_ground() -> None:
