@@ -22,6 +22,7 @@ DEVICE_KEYS = {  # of a gamepad, or of a keyboard
     "BTN_TR": DEAD_MAN, "BTN_START": ARM, "BTN_SOUTH": WALK, "BTN_EAST": STOP, "ABS_HAT0Y+": DEEPER,
     "ABS_HAT0Y-": SHALLOWER, "BTN_DPAD_DOWN": DEEPER, "BTN_DPAD_UP": SHALLOWER,
     "KEY_SPACE": DEAD_MAN, "KEY_A": ARM, "KEY_W": WALK, "KEY_S": STOP, "KEY_DOWN": DEEPER, "KEY_UP": SHALLOWER,
+    "KEY_Q": QUIT,
 }  # fmt: skip
 TERMINAL_KEYS = {
     b" ": DEAD_MAN, b"a": ARM, b"w": WALK, b"s": STOP, b"\x1b[B": DEEPER, b"\x1b[A": SHALLOWER,

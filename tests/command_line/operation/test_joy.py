@@ -177,6 +177,11 @@ def test_a_gamepad_is_read_by_the_names_of_its_keys_until_it_is_gone(
         pad(0.1)
 
 
+def test_a_keyboard_of_the_robot_s_own_computer_ends_the_drive_too() -> None:
+    keyboard: Any = SimpleNamespace(pressed=lambda: {"KEY_Q"})
+    assert device_pad(keyboard)(0.0) == Controls(False, frozenset({QUIT}))
+
+
 def driven_by(monkeypatch: pytest.MonkeyPatch, bench: Bench, controls: Callable[[Report], Controls]) -> None:
     """Let `joy` read its controls from a function of the robot's state."""
 
