@@ -151,7 +151,7 @@ class StatusSocket:
     def _handle_events(self, listener: Listener, descriptor: int, events: int) -> None:
         """Read from a client, unless an earlier request of it still waits; further data stays in the kernel."""
         client = listener.clients[descriptor]
-        if events & select.EPOLLHUP:
+        if events & select.EPOLLHUP and self.is_protected(client.caller):  # for any other, its drop is soon enough
             self.on_hang_up(client.caller)
         if events & (select.EPOLLIN | select.EPOLLHUP) and descriptor not in listener.waiting and not client.ended:
             listener.clients[descriptor] = listener.clients.pop(descriptor)  # to the end of the order

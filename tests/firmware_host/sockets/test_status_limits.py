@@ -7,6 +7,7 @@ from pathlib import Path
 import msgpack
 import pytest
 
+from firmware_host.lease import Lease
 from firmware_host.sockets.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import NOT_PERMITTED
@@ -217,6 +218,7 @@ def test_a_disconnection_is_reported_with_its_caller(served: Served) -> None:
 def test_a_disconnection_is_reported_before_its_requests_are_answered(served: Served) -> None:
     gone: list[Caller] = []
     served.on_hang_up = gone.append
+    served.is_protected = lambda caller: True  # it holds the lease
     client = connect(served)
     serve(served, 3)
     client.sendall(ECHO * 1000)
@@ -224,3 +226,19 @@ def test_a_disconnection_is_reported_before_its_requests_are_answered(served: Se
     client.close()
     serve(served, 1)
     assert gone
+
+
+def test_the_last_requests_of_an_overruled_program_are_refused_after_its_end(served: Served) -> None:
+    lease, refusals = Lease(), []
+    served.on_hang_up, served.is_protected = lease.hang_up, lambda caller: caller == lease.holder
+    served.methods = {
+        "lease": lambda params, caller: lease.renew(caller, served.now_s, 5.0),
+        "move": lambda params, caller: refusals.append(lease.refusal(caller, served.now_s)),
+    }
+    client = connect(served)
+    assert ask(served, client, msgpack.packb([0, 1, "lease", {}])) == [[1, 1, None, None]]
+    client.sendall(msgpack.packb([0, 2, "move", {}]) * 3)
+    lease.oust("another operator")
+    client.close()
+    serve(served, 6)
+    assert len(refusals) == 3 and all(refusals)
