@@ -30,7 +30,7 @@ from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import Track
 
-LONGEST_STRIDE_S = 120.0
+LONGEST_STRIDE_S = 3600.0  # a phase may take a minute; a robot that is stuck ends by a fault
 TRACK_M = 100.0
 
 Gait: TypeAlias = Annotated[str, Option("a gait file, or the name of a gait that ships", metavar="FILE")]
@@ -94,13 +94,15 @@ def simulate(
         raise ConfigurationError([str(problem)]) from None
     except RuntimeError as problem:
         raise CommandError(str(problem)) from None
-    lockstep.run_until(lambda: lockstep.loop.target.stride >= 0, LONGEST_STRIDE_S)
-    walked = [_stride(lockstep, stride) for stride in range(strides) if lockstep.loop.mode is Mode.WALKING]
+    loop = lockstep.loop
+    lockstep.step()  # takes the order
+    lockstep.run_until(lambda: loop.target.stride >= 0 or loop.mode is not Mode.WALKING, LONGEST_STRIDE_S)
+    walked = [_stride(lockstep, stride) for stride in range(strides) if loop.mode is Mode.WALKING]
     print(table([("stride", "cm", "s", "cm/s", "attempts to free a flipper"), *map(_cells, walked)]))
     advance_m, duration_s = sum(each["m"] for each in walked), sum(each["s"] for each in walked)
     if walked:  # else a fault came before the first stride
         print(f"\n{100.0 * advance_m:.1f} cm in {duration_s:.1f} s, {100.0 * advance_m / duration_s:.2f} cm/s")
-    if fault := lockstep.loop.fault:
+    if fault := loop.fault:
         complain(fault.message)
     return exit_codes.UNHEALTHY if fault else exit_codes.OK
 
