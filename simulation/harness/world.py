@@ -21,6 +21,7 @@ from firmware_host.configuration.toml_records import (
     rename_former_keys,
     shown,
 )
+from simulation.body.free_body import BodyShape
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import FIXED_OF_DRIVE, drives_of, plant_of
@@ -35,7 +36,7 @@ from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, UNIFORM, Track
 from simulation.mud.unevenness import RandomStrength, Ridges
 
-STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's stiffest mud
+STRONGEST_PA = 50e3  # of a segment and of its layers: over ten times the paper's stiffest mud
 PAVLOV_N_M3 = 1.55e6  # fits plates that were pushed into dry sand (Pavlov 2022)
 SAME_POSITION_M = 1e-9
 
@@ -57,7 +58,11 @@ class World:
         fixed_base = configuration.estimation.fixed_base
         if fixed_base and self.robot_changes.get("free_body"):
             raise ConfigurationError(["robot.free_body = true: the configuration says estimation.fixed_base = true"])
-        return plant_of(configuration, self.disturbances, **({"fixed_base": fixed_base} | dict(self.robot_changes)))
+        changes = {"fixed_base": fixed_base} | dict(self.robot_changes)
+        body: BodyShape | None = changes.get("body")
+        if body and body.axis_above_belly_m == BodyShape.axis_above_belly_m:  # left out: that of the configuration
+            changes["body"] = replace(body, axis_above_belly_m=configuration.geometry.axis_height_m)
+        return plant_of(configuration, self.disturbances, **changes)
 
     def drives(self, configuration: Configuration, **defaults: Any) -> dict[str, SimulatedDriveParameters]:
         """`defaults`: replace the usual values where neither disturbances nor the file set them."""
@@ -121,12 +126,15 @@ def load_world(path: Path) -> World:
 
 
 def parse_world(text: str, file: Path | None = None) -> World:
-    """Read a world. Raises ConfigurationError with all problems."""
+    """Read a world. Raises ConfigurationError."""
     return read_world(parse_document(text, file))
 
 
 def read_world(document: dict[str, Any]) -> World:
-    """Read a world from the tables of its file. Raises ConfigurationError with all problems."""
+    """Read a world from the tables of its file.
+
+    Raises ConfigurationError with all problems of single keys, or else with all contradictions between them.
+    """
     warnings = tuple(rename_former_keys(document, FORMER_KEYS))
     text = WorldText(**_READER.read(document))
     problems = list(_contradictions(text))
@@ -159,6 +167,8 @@ def _contradictions(text: WorldText) -> Iterator[str]:
 
 def _mud_problems(key: str, segment: SegmentText) -> Iterator[str]:
     water, strength, sand = segment.water_percent, segment.strength_pa, segment.sand
+    if not sand and segment.stiffness_n_m3 != PAVLOV_N_M3:
+        yield f"{key}.stiffness_n_m3 = {segment.stiffness_n_m3:g}: belongs to sand; remove it, or name the sand"
     if sand:
         for name in ("water_percent", "strength_pa", "layer", "thixotropy"):
             if getattr(segment, name):

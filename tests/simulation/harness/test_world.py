@@ -94,6 +94,7 @@ def test_a_segment_may_be_sand_or_thixotropic() -> None:
         (SECOND.replace("water_percent = 48.5", ""), "segment 2", "strength_pa"),
         (SECOND.replace("water_percent = 48.5", "sand = 'gravel'"), "segment 2.sand", "spatial"),
         (SECOND + "sand = 'spatial'", "segment 2.water_percent", "sand = 'spatial'"),
+        (SECOND + "stiffness_n_m3 = 2e6", "segment 2.stiffness_n_m3", "sand"),
         (SECOND + "[segment.thixotropy]\nrecovery_s = -1\n", "segment 2.thixotropy.recovery_s", "0.1"),
         (SECOND.replace("0.5", "0.4"), "segment 2.start_m", "overlap"),
         (SECOND.replace("0.5", "0.6"), "segment 2.start_m", "gap"),
@@ -167,3 +168,10 @@ def test_a_lockstep_runs_in_a_world(configuration: Configuration) -> None:
     for joint, drive in zip(configuration.drive.values(), lockstep.robot.drives, strict=False):
         assert (drive.parameters.encoder_counts, drive.parameters.current_noise_a) == (4096, 0.3)
         assert drive.parameters.torque_constant_nm_a == joint.torque_constant_nm_a
+
+
+def test_a_body_of_another_shape_keeps_the_configured_height_of_its_joints(configuration: Configuration) -> None:
+    higher = replace(configuration, geometry=replace(configuration.geometry, axis_height_m=0.07))
+    for given, expected_m in (("width_m = 0.1", 0.07), ("axis_above_belly_m = 0.05", 0.05)):
+        world = parse_world(SHORTEST + "[robot]\nfree_body = true\n[robot.body]\n" + given)
+        assert world.plant(higher).body.axis_above_belly_m == expected_m
