@@ -110,7 +110,7 @@ def named_folder(name: str) -> Path:
 
     Raises ValueError for a name with a path in it, and OSError where another user could write to the folder.
     """
-    if Path(name).name != name or name == "..":
+    if Path(name).name != name or name in ("", ".."):
         raise ValueError(f"{name!r} is not a plain name")
     return make_own_folder(run_folder() / name)
 

@@ -117,6 +117,7 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
     """
     try:
         peer = Peer(configuration, ground.make_world(configuration), seed)
+        _obey_signals(peer)
         announce()
     except ConfigurationError as problem:
         return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
@@ -124,13 +125,16 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
         return _refuse(f"{problem}. 'mudskipper simulate --config FILE --local' needs none of its interfaces")
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
+    take_precedence()
+    peer.run()
+    return 0
+
+
+def _obey_signals(peer: Peer) -> None:
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
     signal.signal(signal.SIGUSR2, lambda number, frame: peer.robot.turn_emergency_stop())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
-    take_precedence()
-    peer.run()
-    return 0
 
 
 def _refuse(*messages: str, status: int = 1) -> int:

@@ -9,7 +9,7 @@ from control.controller import WalkOrder
 from control.faults import Reaction
 from control.modes import Request
 from firmware_host.configuration.loading import load_configuration
-from simulation.harness.local_setup import write_local_setup
+from simulation.harness.local_setup import named_folder, write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
@@ -51,3 +51,9 @@ def test_neither_a_late_loop_nor_late_drives_end_a_walk(lockstep: Lockstep, late
         faults += [fault.name for fault in lockstep.loop.faults.begun if fault.kind.reaction > Reaction.WARN]
     assert faults == []
     assert lockstep.loop.controller.target.stride > 1
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/b"])
+def test_a_folder_has_a_plain_name_of_its_own(name: str) -> None:
+    with pytest.raises(ValueError, match="plain name"):
+        named_folder(name)

@@ -1,5 +1,8 @@
 """The simulated robot runs in real time, also on a busy computer."""
 
+import multiprocessing
+import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from drivers.odrive.parameters import OdriveParameters
 from firmware_host.buses import open_ports
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.peer import WATCHDOG_S, Peer, take_precedence, track_of
+from simulation.harness.peer import WATCHDOG_S, Ground, Peer, simulate, take_precedence, track_of
 from simulation.harness.world import World
 
 HELD_UP_S = 4.0 * WATCHDOG_S
@@ -76,6 +79,19 @@ def test_joints_do_not_move_on_in_time_that_the_robot_has_lost(bench: Bench) -> 
     assert bench.peer.robot.plant.angles_rad == before
     bench.step(0.01)
     assert bench.peer.robot.plant.angles_rad != before
+
+
+def test_a_robot_obeys_signals_as_soon_as_it_is_announced(short_folder: Path) -> None:
+    configuration = load_configuration(write_local_setup(short_folder, short_folder / "logs"))
+
+    def announce() -> None:
+        for number in (signal.SIGUSR1, signal.SIGTERM):
+            os.kill(os.getpid(), number)
+
+    process = multiprocessing.get_context("fork").Process(target=simulate, args=(configuration, Ground(), 1, announce))
+    process.start()
+    process.join(30.0)
+    assert process.exitcode == 0
 
 
 @pytest.mark.parametrize(("processors", "expected"), [({0}, ["nice"]), ({0, 1}, ["real time"])], ids=["one", "two"])
