@@ -9,7 +9,9 @@ belly.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from random import Random
 from typing import Annotated, Any
 
@@ -87,19 +89,26 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     while robot.now_s < WALK_S and robot.loop.mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING):
         _operate(robot, chance, order)
         robot.step()
-        faults += [(robot.now_s, fault) for fault in robot.loop.faults.begun if fault.kind.reaction > Reaction.WARN]
+        faults += [
+            (robot.now_s, fault.name) for fault in robot.loop.faults.begun if fault.kind.reaction > Reaction.WARN
+        ]
         strides = max(strides, robot.loop.controller.target.stride + 1)
-    of_mud = (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD
-    named = [(f"{now_s:.2f} s: {fault.name}", fault.name in of_mud) for now_s, fault in faults]
-    held, alarms = [text for text, by_mud in named if by_mud], [text for text, by_mud in named if not by_mud]
+    held, alarms = counted_apart(faults, (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD)
     return {
         "duration_s": robot.now_s,
         "play_deg": disturbances.play_deg,
         "strides": strides,
         "distance_m": robot.robot.plant.body_m,
-        "alarms": [] if held else alarms,
+        "alarms": alarms,
         "held": held,
     }
+
+
+def counted_apart(faults: Sequence[tuple[float, str]], of_mud: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the faults of the mud, and the false alarms. What comes with a fault of the mud or later may follow it."""
+    held_s = min((now_s for now_s, name in faults if name in of_mud), default=inf)
+    held = [f"{now_s:.2f} s: {name}" for now_s, name in faults if name in of_mud]
+    return held, [f"{now_s:.2f} s: {name}" for now_s, name in faults if now_s < held_s]
 
 
 def _operate(robot: FailingRobot, chance: Random, order: WalkOrder) -> None:

@@ -108,3 +108,9 @@ def test_a_walk_in_which_nothing_fails_has_no_alarm(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(healthy_walks, "WALK_S", 4.0)
     walked = healthy_walks.walk(3)
     assert walked["strides"] > 0 and walked["alarms"] == walked["held"] == []
+
+
+def test_a_false_alarm_before_the_mud_holds_a_flipper_counts() -> None:
+    faults = [(1.0, "current_stale"), (2.0, "flipper_stuck"), (2.5, "current_silent")]
+    held, alarms = healthy_walks.counted_apart(faults, healthy_walks.BY_THE_MUD)
+    assert (held, alarms) == (["2.00 s: flipper_stuck"], ["1.00 s: current_stale"])
