@@ -1,9 +1,9 @@
 """The simulator's reference sensor: the true strokes of the flippers, for a load cell to repeat.
 
 It reads the plant, not the drives: true angles, velocities and surface, once in every tick of the loop, together with
-the phase that was commanded for that tick. It closes a stride when swing, insertion or rest follows the last of its
-three strokes; a stride that a rest interrupts does not count. Speeds are those of the middle of the plate's lower edge
-relative to the mud, so they include the body's motion.
+the phase that was commanded for that tick. It closes a stride when swing or insertion follows the last of its three
+strokes; a stride that a rest interrupts or follows does not count. Speeds are those of the middle of the plate's lower
+edge relative to the mud, so they include the body's motion.
 """
 
 from dataclasses import dataclass

@@ -12,8 +12,9 @@ each times g(v) = (1 + c v^0.4) / (1 + c 0.1^0.4), which is 1 at 0.1 m/s. plate_
 below, as the robot of Table I did.) None of this is the k-law that the estimator assumes.
 
 c = 0.4: a plate that stops keeps 86 % of its load, where the authors' logs keep 85 to 90 %, and ten times the speed
-adds a tenth to the strength, as in clay practice. (So a held insertion in the simulated 48.5 % mud keeps 84 % after
-3 s, and reaches 2.7 N at 3 cm; the authors' logs of the mud that they call 12.5N show 2.5 to 2.8 N.)
+adds a tenth to the strength at 0.01 m/s, as in clay practice, and a fifth at 0.1 m/s. (So a held insertion in the
+simulated 48.5 % mud keeps 84 % after 3 s, and reaches 2.7 N at 3 cm; the authors' logs of the mud that they call 12.5N
+show 2.5 to 2.8 N.)
 
 The three strengths are fitted to the six fixed-depth speeds of the paper's Table I, together with the damping of the
 body's rail, by experiments/studies/mud_fit.py; the adaptive speeds are not used. Four fitted numbers reproduce six
