@@ -5,7 +5,7 @@ there (mud_layout.py), the mud of the log's trial, the label in the name of a CS
 the robot noticed, described by its k_p.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan
@@ -28,7 +28,7 @@ from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes
 from logs.files.log_error import LogError, Watch
 from logs.files.log_reader import watched_blocks
-from logs.files.log_summary import trial_of
+from logs.files.log_summary import segment_of, segments_before, trial_of
 from logs.files.scanned_log import ScannedLog, join_logs, scan_log
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.lab_csv import is_lab_csv, read_lab_csv
@@ -72,7 +72,10 @@ class Run:
 def read_runs(
     files: Sequence[Path], layout: MudLayout | None, watch: Watch, vertical: CaptureAxis = VERTICAL_AXIS
 ) -> list[Run]:
-    """Read logs, join the segments of each run, replay them and describe their strides. Raises LogError."""
+    """Read logs, join the segments of each run, replay them and describe their strides. Raises LogError.
+
+    A trial begins a run of its own, so the trials of one daemon are compared.
+    """
     runs: dict[str, dict[Path, ScannedLog | None]] = {}
     for path in files:
         if not (path.suffix == ".mcap" or is_lab_csv(path)):
@@ -82,9 +85,20 @@ def read_runs(
             raise LogError(f"{path}: {'given twice' if same else f'has the name of {known}: rename one of them'}")
         log = None if is_lab_csv(path) else scan_log(path, watch)
         runs.setdefault((log and log.metadata.get("run_id")) or str(path), {})[path] = log
-    joined = [(list(run), [log for log in run.values() if log]) for run in runs.values()]
+    parts = [part for run in runs.values() for part in _trials_in(run)]
+    joined = [(list(part), [log for log in part.values() if log]) for part in parts]
     sources = [(paths, join_logs(paths, logs) if logs else None) for paths, logs in joined]
     return [_read_run(paths, log, layout, watch, vertical) for paths, log in sources]
+
+
+def _trials_in(run: Mapping[Path, ScannedLog | None]) -> list[dict[Path, ScannedLog | None]]:
+    """Split the segments of a run, in their order, where a trial begins."""
+    parts: list[dict[Path, ScannedLog | None]] = []
+    for path, log in sorted(run.items(), key=lambda each: segment_of(each[1]) if each[1] else 0):
+        if not parts or (log and not segments_before(log)):
+            parts.append({})
+        parts[-1][path] = log
+    return parts
 
 
 def _name_of(path: Path) -> str:

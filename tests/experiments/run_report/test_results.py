@@ -1,6 +1,7 @@
 """Results agree with a known truth: the simulated robot's position, strides with known values, known differences."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from math import hypot, sqrt
 from pathlib import Path
 from statistics import fmean
@@ -28,8 +29,9 @@ from experiments.run_report.results import (
     run_labels,
     speed_of,
 )
-from experiments.run_report.run import Run, read_runs
+from experiments.run_report.run import Run, _trials_in, read_runs
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.trial import BEGUN, OperatorReport
 from logs.fault_history import LoggedCause
 from logs.files.log_error import unwatched
 from logs.files.log_reader import read_log
@@ -186,6 +188,18 @@ def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_r
     assert [*run_labels(runs, headlines).values()] == labels
     rows = comparison_result(runs, headlines).tables[0].rows
     assert list(rows["run"]) == labels
+
+
+def test_trials_of_one_daemon_are_runs_of_their_own_and_their_segments_are_not() -> None:
+    """As the daemon numbers the logs of one run: nothing, trial 3 in two segments, trial 4."""
+    trials = [OperatorReport(BEGUN, datetime.now(UTC), "Anna", text).event for text in ('{"trial": "3"}', "{}")]
+    begins = ["", trials[0], "", trials[1]]
+    logs: dict[Path, Any] = {
+        Path(f"{n}.mcap"): SimpleNamespace(metadata={"segment": str(n)}, events=[{"text": text}])
+        for n, text in enumerate(begins)
+    }
+    in_any_order = {path: logs[path] for path in reversed(logs)}
+    assert [[path.stem for path in part] for part in _trials_in(in_any_order)] == [["0"], ["1", "2"], ["3"]]
 
 
 def test_a_ground_that_does_not_keep_the_law_of_mud_is_a_finding() -> None:
