@@ -1,10 +1,10 @@
 """The dead-man lease: a program that moves the robot must renew it, or the robot stops.
 
-The lease is lost if its holder disconnects or does not renew it in time. It stays lost until the robot has stopped and
-its torque is off; then the loop resets it, and the robot can be armed again. One program holds the lease at a time.
-Meanwhile no other program moves the robot, also while torque is off and hands may be in the mud; every user may still
-stop it. An operator may take the robot over. The previous holder is then refused until it connects again, since a
-program that was overruled must not continue as if nothing had happened.
+The lease is lost if its holder disconnects or does not renew it in time. It stays lost until its holder releases it, or
+until the robot has stopped and its torque is off: then the loop resets it, and the robot can be armed again. One
+program holds the lease at a time. Meanwhile no other program moves the robot, also while torque is off and hands may be
+in the mud; every user may still stop it. An operator may take the robot over. The previous holder is then refused until
+it connects again, since a program that was overruled must not continue as if nothing had happened.
 """
 
 from collections.abc import Hashable
