@@ -190,7 +190,7 @@ def _change_mode(command: str, mode: str, socket: Socket, params: dict[str, Any]
 
 
 def _call_patiently(client: StatusClient, command: str, params: dict[str, Any], waiting_s: float) -> None:
-    """Call until it is accepted. Raises CallRefusedError after `waiting_s`, and at once in any mode but boot and idle."""
+    """Call until it is accepted. Raises CallRefusedError after `waiting_s`, and at once in modes but boot and idle."""
     deadline_s, reported = time.monotonic() + waiting_s, False
     while True:
         try:
