@@ -40,7 +40,7 @@ Muds = Annotated[
 def log_report(
     files: Annotated[
         tuple[Path, ...],
-        Option("log of this project, its segments, or a CSV file of the paper's authors; several runs or trials are compared"),
+        Option("log of this project, its segments, or a CSV file of the paper's authors; runs and trials are compared"),
     ],
     *,
     out: Annotated[Path | None, Option("(default: a folder named after the log)", metavar="DIR", parse=folder)] = None,
