@@ -150,17 +150,18 @@ def differences(old: Any, new: Any, names: Mapping[str, str], ignored: frozenset
 
 
 def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]) -> int:
-    """Print the differences of each file; return 0 where nothing differs."""
-    failed = 0
-    for path in sorted(old.glob("*.json")):
-        if not (new / path.name).exists():
-            print(f"{path.name}: not recorded")
-            failed += 1
+    """Print the differences of each file; return 0 where there are files and none differs."""
+    files = sorted({path.name for folder in (old, new) for path in folder.glob("*.json")})
+    failed = not files
+    for file in files:
+        if missing := [folder for folder in (old, new) if not (folder / file).exists()]:
+            print(f"{file}: not in {missing[0]}")
+            failed = True
             continue
-        before, after = (json.loads((folder / path.name).read_text(encoding="utf-8")) for folder in (old, new))
+        before, after = (json.loads((folder / file).read_text(encoding="utf-8")) for folder in (old, new))
         found = list(differences(before, after, names, ignored))
-        failed += bool(found)
-        print(f"{path.name}: {f'{len(found)} differences' if found else 'identical'}")
+        failed |= bool(found)
+        print(f"{file}: {f'{len(found)} differences' if found else 'identical'}")
         print("".join(f"  {line}\n" for line in found[:DIFFERENCES_SHOWN]), end="")
     return 1 if failed else 0
 

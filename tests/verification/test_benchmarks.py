@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.folders import ROOT
-from verification.behaviour import differences
+from verification.behaviour import differences, main
 from verification.benchmark import Report, measure_in_turns, paired_ratio, run_benchmark
 from verification.speed import lockstep_speed, log_length, tick_time, timed_walk
 from verification.stress import daemon_kills
@@ -128,3 +128,14 @@ def test_behaviour_reports_every_difference_and_accepts_new_names() -> None:
     found = list(differences(old, new, {"place_m": "position_m"}, frozenset({"version"})))
     assert found == [".came: added", ".gone: missing", ".rows: 1 entries, before 2", ".rows[0].a: 1.0, before 1"]
     assert list(differences({"place_m": 1}, {"place_m": 1}, {"place_m": "position_m"}, frozenset())) == []
+
+
+def test_behaviour_that_only_one_folder_has_differs(tmp_path: Path) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    assert main(["compare", str(old), str(new)]) == 1  # as with a wrong name
+    for folder in (old, new):
+        folder.mkdir()
+        (folder / "walk.json").write_text("{}", encoding="utf-8")
+    assert main(["compare", str(old), str(new)]) == 0
+    (new / "sweep.json").write_text("{}", encoding="utf-8")
+    assert main(["compare", str(old), str(new)]) == main(["compare", str(new), str(old)]) == 1
