@@ -5,6 +5,7 @@ the hands are out of the mud. A file or a pipe holds nothing but answers, so all
 """
 
 import math
+import os
 import select
 import sys
 import termios
@@ -51,9 +52,13 @@ class TerminalPrompt:
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
         self._make_room()
         print(prompt, end="", file=sys.stderr, flush=True)
-        while not select.select([sys.stdin], [], [], POLL_S)[0]:
-            meanwhile()
-        line = sys.stdin.readline()
+        line = b""
+        while not line.endswith(b"\n"):  # by bytes: a buffer would hide the next answer of a pipe from `select`
+            while not select.select([sys.stdin], [], [], POLL_S)[0]:
+                meanwhile()
+            if not (byte := os.read(sys.stdin.fileno(), 1)):
+                break
+            line += byte
         if not line:
             raise EndedError("the input has ended, but the operator has to answer: run this on a terminal")
-        return line.strip()
+        return line.decode(errors="replace").strip()

@@ -74,6 +74,18 @@ def test_the_robot_is_attended_during_a_prompt(monkeypatch: pytest.MonkeyPatch) 
     assert len(looks) == 3
 
 
+def test_answers_that_come_together_through_an_open_pipe_all_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    source, sink = os.pipe()
+    os.write(sink, b"s\nr\n")
+    with open(source, encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
+        prompt = TerminalPrompt()
+        # the second one is there: a prompt that waited for it would close the pipe, and get the end of the input
+        answers = [prompt.ask("Well?", ANSWERS, nothing), prompt.ask("Well?", ANSWERS, lambda: os.close(sink))]
+    os.close(sink)
+    assert answers == ["s", "r"]
+
+
 def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypatch: pytest.MonkeyPatch) -> None:
     keyboard, terminal = os.openpty()
     os.write(keyboard, b"\n\n")  # typed before the question, while the robot still walked
