@@ -58,16 +58,16 @@ class Arm:
         """Put the arm at rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.contact = FlipperContact(self.parameters.geometry, self.parameters.disturbances.relaxation)
         self.history.reset()
-        self.relief_m = self.track.surface_m(0.0)  # depth of the track's own surface, without earlier strokes
         self.put_back()
         self.force = NO_CONTACT
         self.ground = self.track.ground_at(0.0)
 
-    def put_back(self) -> None:
+    def put_back(self, body_m: float = 0.0) -> None:
         """Move the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
 
-        The mud keeps the effects of earlier strokes.
+        The mud keeps the effects of earlier strokes. `body_m`: the body's position along the track.
         """
+        self.relief_m = self.track.surface_m(body_m)  # depth of the track's own surface, without earlier strokes
         self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = self.adduction_rad = 0.0
         if not self.mount:
             self.adduction_rad = self.parameters.geometry.adduction_rad(0.0, self.surface_m)

@@ -59,7 +59,7 @@ class SimulatedRobot:
         if self._put_back_requested:
             self._put_back_requested = False
             for arm in self.plant.arms:
-                arm.put_back()
+                arm.put_back(self.plant.body_m)
         for drive in () if self.powered else self.drives:
             drive.restart(self.now_s)  # it boots once the power is back
         wires = tuple(zip(self.drives, self._port_of_drive, strict=True))

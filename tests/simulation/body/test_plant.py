@@ -16,6 +16,7 @@ from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, 
 from simulation.mud.ground_contact import Ground
 from simulation.mud.rigid_plate import Attitude
 from simulation.mud.track import Track
+from simulation.mud.unevenness import Ridges
 from tests.control.synthetic_states import NO_TORQUE
 
 TRACK = Track([(1.0, MUDS["48.5"])])
@@ -201,3 +202,13 @@ def test_the_clay_is_the_one_where_the_flipper_is_not_where_the_body_is() -> Non
     plant.arms[0].sweep_rad, plant.arms[1].sweep_rad = radians(30.0), radians(-30.0)
     plant.step(STEP_S, NO_TORQUE)
     assert [arm.ground for arm in plant.arms] == [MUDS["53.1"], MUDS["48.5"]]
+
+
+def test_an_arm_that_is_put_back_on_ridges_lies_on_the_mud_below_it() -> None:
+    plant = Plant(PlantParameters(), Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.01, 0.2)))
+    arm, body_m = plant.arms[0], 0.046
+    arm.sweep_rad, arm.adduction_rad = 1.0, 0.5  # over a trough; straight out there is a crest
+    arm.step(STEP_S, body_m, 0.0, 0.0, 0.0)
+    arm.put_back(body_m)
+    edge_m = arm.parameters.geometry.depth_m(arm.sweep_rad, arm.adduction_rad)
+    assert edge_m == pytest.approx(plant.track.surface_m(body_m)) == pytest.approx(-0.01, abs=1e-4)
