@@ -68,11 +68,14 @@ def test_a_sweep_that_cannot_reach_the_least_depth_is_refused(example_text: str)
 
 
 def test_an_adduction_limit_that_excludes_a_possible_pose_is_refused(example_text: str) -> None:
-    """At 3 cm a wide sweep needs the steepest arm: 5 cos β + 12 cos α sin β - 6.45 = 3 with β = 43.1° over ±45°."""
+    """At 3 cm a wide sweep needs the steepest arm: 5 cos β + 12 cos α sin β - 6.45 = 3 with β = 43.1° over ±45°.
+
+    The bound is rounded to a value that is accepted.
+    """
     adaptation = "max_depth_m = 0.03\nmin_depth_m = 0.02\nmax_sweep_deg = 45.0"
     limits = "adduction_min_deg = -40.0"
     assert problems_of(example_text, adaptation=adaptation, limits=limits) == [
-        "limits.adduction_min_deg = -40.0: must be at most -43.1 for adaptation.gait.min_sweep_deg to max_sweep_deg"
+        "limits.adduction_min_deg = -40.0: must be at most -43.2 for adaptation.gait.min_sweep_deg to max_sweep_deg"
     ]
 
 
