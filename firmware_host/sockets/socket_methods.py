@@ -315,6 +315,7 @@ METHODS: dict[str, SocketMethod] = {
         Level.DRIVE,
         "Walk, with a depth that adapts to the mud or is fixed. A described walk is a trial: it begins a new log.",
         (DEPTH, DEPTHS, STRIDES, GAIT_FILE, *LEASE, *TRIAL),
+        refuses_unknown=True,
     ),
     "depth": SocketMethod(
         Level.DRIVE,

@@ -373,7 +373,10 @@ def test_an_invalid_move_is_refused_with_its_reason(armed: Robot, angles_rad: di
     assert not armed.ask("status")["moving"]
 
 
-def test_other_methods_than_move_ignore_unknown_parameters(robot: Robot) -> None:
+def test_what_moves_the_robot_refuses_unknown_parameters_and_other_methods_ignore_them(robot: Robot) -> None:
+    for method in ("walk", "move", "stride"):
+        with pytest.raises(RefusedError, match="there is no parameter 'wtaer' here"):
+            robot.ask(method, wtaer="49")
     assert robot.ask("hello", later_version=1) == robot.ask("hello")
     assert robot.ask("stop", reason="lunch") == "accepted"
 
