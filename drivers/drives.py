@@ -47,7 +47,7 @@ class Drives:
             tables = (axis.receivers.items() for axis in self.axes if axis.parameters.bus == name)
             own: dict[int, Callable[[bytes, float], None]] = {}
             for key, receive in chain.from_iterable(tables):
-                own[key] = _both(own[key], receive) if key in own else receive
+                own[key] = partial(_both, own[key], receive) if key in own else receive
             strange = {key: partial(self._on_other, *other) for key, other in (others or {}).get(name, {}).items()}
             self._receivers.append((port, strange | own))
             port.listen_to(key & EXTENDED_MASK for key in self._receivers[-1][1])
@@ -197,12 +197,8 @@ class Drives:
 
 
 def _both(
-    first: Callable[[bytes, float], None], second: Callable[[bytes, float], None]
-) -> Callable[[bytes, float], None]:
-    """Make the handler of an id that drives share; each finds its own frames by their payload."""
-
-    def receive(data: bytes, now_s: float) -> None:
-        first(data, now_s)
-        second(data, now_s)
-
-    return receive
+    first: Callable[[bytes, float], None], second: Callable[[bytes, float], None], data: bytes, now_s: float
+) -> None:
+    """Handle what arrives under an id that drives share; each finds its own frames by their payload."""
+    first(data, now_s)
+    second(data, now_s)

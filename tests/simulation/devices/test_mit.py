@@ -1,5 +1,6 @@
 """The simulated drive in MIT mode, and the axis that commands it: what no drive of another type has."""
 
+from copy import deepcopy
 from math import isnan
 
 import pytest
@@ -15,7 +16,7 @@ from tests.drivers.bench.simulated_bus import simulated
 from tests.simulation.devices.driven_drives import DrivenDrives
 
 STEP_NM = MODELS["DM4310"].torque_step_nm
-DAMIAO, CUBEMARS = "mit", "mit:AK80-9"
+DAMIAO, CUBEMARS, ROBSTRIDE = "mit", "mit:AK80-9", "mit:RS05"
 
 
 @pytest.fixture
@@ -105,6 +106,15 @@ def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
     health = drives.axis.health
     assert isnan(health.watchdog_s) and health.watchdog_advice
     assert health.firmware_supported and drives.drives.unknown_frames == 0
+
+
+def test_a_copied_robot_hears_its_own_drives_under_the_id_that_they_share() -> None:
+    """Random schedules begin with copies of one walk."""
+    drives = DrivenDrives(ROBSTRIDE)
+    drives.arm()
+    copied, stamp_s = deepcopy(drives), drives.state.angle_stamp_s
+    copied.tick(0.1, count=5)
+    assert copied.state.angle_stamp_s > stamp_s == drives.state.angle_stamp_s
 
 
 def test_old_cubemars_that_all_answer_under_id_0_are_distinguished_by_their_first_byte() -> None:
