@@ -69,6 +69,8 @@ class Moments(NamedTuple):
     @classmethod
     def of(cls, blocks: Sequence[Block]) -> "Moments":
         """Return those of a stroke."""
+        if not blocks:
+            return cls()
         u, m = map(exact_sum, zip(*blocks, strict=True))
         n = len(blocks)
         about = [(a - u / n, b - m / n) for a, b in blocks]
@@ -162,9 +164,9 @@ class JointStrokes:
             crossed = blocks[:-joins] if joins > 1 else blocks  # in the last ones a rotor may still be in its play
             rows = zip(*[iter(crossed)] * joins, strict=False)
             joined = [(exact_sum(u for u, _ in row) / joins, exact_sum(m for _, m in row) / joins) for row in rows]
-            whole, driven = Moments.of(blocks), blocks[self._braked :]
-            without = whole if not self._braked else Moments.of(driven) if driven else Moments()
-            self._stride = self._stride.plus(Stride(whole, Moments.of(joined) if joined else Moments(), without))
+            whole = Moments.of(blocks)
+            driven = Moments.of(blocks[self._braked :]) if self._braked else whole
+            self._stride = self._stride.plus(Stride(whole, Moments.of(joined), driven))
         self._clear_stroke()
 
     def end_stride(self) -> Stride:

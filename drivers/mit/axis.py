@@ -51,7 +51,7 @@ class MitAxis(AnsweringAxis):
     def reset(self) -> None:
         super().reset()
         self._status = 0
-        self._told_fault: int | None = None  # by a RobStride, when it was asked
+        self._reported_fault: int | None = None  # of a RobStride, when it was asked
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -92,7 +92,7 @@ class MitAxis(AnsweringAxis):
             return
         if self._ranges.reports_faults_apart and codec.is_faults(data):
             self._on_answer()
-            self._told_fault, self._health = codec.decode_faults(data), None
+            self._reported_fault, self._health = codec.decode_faults(data), None
         else:
             self._receive_answer(data, now_s)
 
@@ -115,7 +115,7 @@ class MitAxis(AnsweringAxis):
             faulty = answer.status not in (codec.DISABLED, codec.ENABLED)
             self._receive_status(answer.status, answer.status if faulty else 0)
         else:
-            fault = answer.fault or self._told_fault or 0
+            fault = answer.fault or self._reported_fault or 0
             follows = self._following and not fault
             self._receive_status(codec.ENABLED if follows else codec.DISABLED, fault)
         if self.closed_loop:
@@ -149,7 +149,7 @@ class MitAxis(AnsweringAxis):
 
     def _on_restart(self) -> None:
         super()._on_restart()
-        self._following, self._told_fault = False, None
+        self._following, self._reported_fault = False, None
 
     def _build_health(self) -> DriveHealth:
         errors, apart = codec.error_text(self._error_flags), self._ranges.reports_faults_apart
@@ -158,7 +158,7 @@ class MitAxis(AnsweringAxis):
             super()
             ._build_health()
             ._replace(
-                firmware_supported=self.settings.supported and not (apart and self._told_fault is None),
+                firmware_supported=self.settings.supported and not (apart and self._reported_fault is None),
                 supported_firmware=f"one that answers the {question}",
                 watchdog_advice=self.settings.watchdog_advice,
                 power_cut=self._error_flags in codec.UNDER_VOLTAGES,
@@ -194,8 +194,7 @@ class MitAxis(AnsweringAxis):
 
     def clear_errors(self) -> None:
         """Clear the errors of a Damiao or a RobStride; those of a CubeMars end with their cause or with its supply."""
-        clears = self._ranges.has_registers or self._ranges.reports_faults_apart
-        self._transmit(codec.CLEAR if clears else codec.LEAVE)
+        self._transmit(codec.CLEAR if codec.CLEAR in self._harmless else codec.LEAVE)
 
     def request_supply(self) -> None:
         """Ask a Damiao for its voltage, a RobStride for its faults; none reports the current of its supply."""
