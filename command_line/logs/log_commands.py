@@ -26,7 +26,7 @@ from firmware_host.operator.reports import known, map_report, stride_report
 from logs.files.log_error import LogError
 from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_logs
-from logs.lab.lab_csv import is_lab_csv, read_lab_csv
+from logs.lab.lab_csv import is_lab_csv, log_name, read_lab_csv
 from logs.lab.summary import finding_reports, lab_summary
 from logs.replay import replay_files
 
@@ -120,7 +120,7 @@ def film(
 
 def _picture_path(log: Path, ending: str) -> Path:
     """Return the log's path with another ending, but not in active/, which the log leaves when it is finished."""
-    name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
+    name = log_name(log) + ending
     if log.absolute().parent.name != ACTIVE:
         return log.parent / name  # also of a folder that is given by mistake
     done = log.absolute().parent.parent / DONE

@@ -31,7 +31,7 @@ from logs.files.log_reader import watched_blocks
 from logs.files.log_summary import segment_of, segments_before, trial_of
 from logs.files.scanned_log import ScannedLog, join_logs, scan_log
 from logs.lab.body_track import VERTICAL_AXIS
-from logs.lab.lab_csv import is_lab_csv, read_lab_csv
+from logs.lab.lab_csv import is_lab_csv, log_name, read_lab_csv
 from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
@@ -80,7 +80,7 @@ def read_runs(
     for path in files:
         if not (path.suffix == ".mcap" or is_lab_csv(path)):
             raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
-        for known in (known for run in runs.values() for known in run if _name_of(known) == _name_of(path)):
+        for known in (known for run in runs.values() for known in run if log_name(known) == log_name(path)):
             same = path.absolute() == known.absolute()
             raise LogError(f"{path}: {'given twice' if same else f'has the name of {known}: rename one of them'}")
         log = None if is_lab_csv(path) else scan_log(path, watch)
@@ -99,11 +99,6 @@ def _trials_in(run: Mapping[Path, ScannedLog | None]) -> list[dict[Path, Scanned
             parts.append({})
         parts[-1][path] = log
     return parts
-
-
-def _name_of(path: Path) -> str:
-    """Return what tells a run from others: its file's name without the ending."""
-    return path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap")
 
 
 def _read_run(
@@ -125,7 +120,7 @@ def _read_run(
     layout = _placed(path, layout, walks)
     strides = _describe_strides(walks, layout)
     return Run(
-        name=_name_of(path),
+        name=log_name(path),
         paths=paths,
         robot=log.metadata.get("robot", "") if log else AUTHORS,
         log=log,

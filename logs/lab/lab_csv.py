@@ -57,6 +57,11 @@ class LabLog(NamedTuple):
     findings: tuple[Finding, ...] = ()
 
 
+def log_name(path: Path) -> str:
+    """Return a log's file name without its ending, also that of an MCAP file."""
+    return path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap")
+
+
 def is_lab_csv(path: Path) -> bool:
     """Return whether a file's name is that of a CSV, compressed or not."""
     return path.name.endswith((".csv", ".csv.gz"))
