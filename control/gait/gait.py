@@ -198,5 +198,5 @@ class Gait:
         if sweep_gap_rad or depth_gap_m:
             sweep_rad, depth_m = sweep_rad + sweep_gap_rad * (1.0 - fraction), depth_m + depth_gap_m * (1.0 - fraction)
             sweep_rad_s, depth_m_s = sweep_rad_s - sweep_gap_rad * rate, depth_m_s - depth_gap_m * rate
-            depth_m = min(depth_m, self.geometry.deepest_m(degrees(sweep_rad)))  # a path that nobody could check
+            depth_m = min(depth_m, self.geometry.deepest_m(degrees(sweep_rad)))  # this path was not checked
         return GaitTarget(row.phase, self.stride, sweep_rad, sweep_rad_s, depth_m, depth_m_s)

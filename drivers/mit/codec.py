@@ -4,7 +4,7 @@ A command goes to the drive's own id and packs position (16 bits), velocity, kp,
 of a model's ranges, big-endian. Four payloads of FF and one last byte are other commands: FC enters the mode, FD leaves
 it, FE makes the present position zero, FB clears the errors of a Damiao and of a RobStride. A drive only sends one
 answer to each command. A RobStride's answer ends in a temperature of 16 bits in place of one and a fault: its faults
-are told in an answer of another form, to a question of their own.
+are reported in an answer of another form, to a question of their own.
 
 A code is (x + range) · (2ⁿ - 1) / (2 · range), so zero lies in the middle of two codes and no command has zero torque.
 Its code here is the nearest one, of the two the upper: the drive follows half a step, range / 4095. A drive is without
@@ -145,7 +145,7 @@ def encode_faults(node_id: int, faults: int) -> bytes:
 
 
 def is_faults(data: bytes) -> bool:
-    """Return whether an answer of a RobStride tells its faults. A state at the lowest torque and 0 °C never occurs."""
+    """Return whether an answer of a RobStride reports its faults. No state has the lowest torque at 0 °C."""
     return len(data) == ANSWER_BYTES and data[4:] == bytes(4)
 
 

@@ -89,13 +89,13 @@ class Mit(DriveType):
         }
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Set a Damiao's status, or the fault of a CubeMars; that of a RobStride where it tells its faults."""
+        """Set a Damiao's status, or the fault of a CubeMars; that of a RobStride where it reports them."""
         data, of_damiao = frame.data, frame.arbitration_id > LARGEST_ID
         if len(data) != codec.ANSWER_BYTES:
             return data
         if frame.arbitration_id == codec.ROBSTRIDE_MASTER:
-            told = codec.is_faults(data) and flags
-            return codec.encode_faults(data[0], ROBSTRIDE_OVERCURRENT) if told else data
+            has_faults = codec.is_faults(data) and flags
+            return codec.encode_faults(data[0], ROBSTRIDE_OVERCURRENT) if has_faults else data
         if of_damiao:
             status = 0x8 | flags & 0x7 if flags else codec.DISABLED if idle else data[0] >> 4
             return bytes([data[0] & 0xF | status << 4]) + data[1:]

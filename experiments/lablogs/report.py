@@ -37,7 +37,7 @@ DEFINITIONS = (
     "between strokes (later ones, without the decline that the trials have in common); 1 is expected. Only trials of "
     "one flipper on a fixed base repeat a stroke.\n\n"
     "Errors are the estimates' repeatability: what differs between strides of one session.\n\n"
-    "Walks: sd of ln k and chi over all strides in one mud, whatever their depth; the exponent of depth over those in "
+    "Walks: sd of ln k and chi over all strides in one mud, of any depth; the exponent of depth over those in "
     "no hole, -2 where k_s is a force that does not depend on depth.\n\n"
     "Left against right: the difference over its claimed error in the strides of walks; a median of 0.67 and a root "
     "mean square of 1 are expected. "

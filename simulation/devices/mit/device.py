@@ -30,7 +30,7 @@ KP_NM_RAD, KD_NM_S_RAD = 500.0, 5.0  # the largest gains
 STEPS = 4095
 # The status of a Damiao; its last three bits are the fault that a CubeMars reports.
 ERRORS = {DriveError.OVERCURRENT: 0xA, DriveError.OVERSPEED: 0xE, DriveError.WATCHDOG: codec.LOST_COMMANDS}
-ROBSTRIDE_BITS = {0xA: 1 << 4, 0xE: 1 << 14}  # of these errors in the faults that a RobStride tells
+ROBSTRIDE_BITS = {0xA: 1 << 4, 0xE: 1 << 14}  # of these errors in the faults that a RobStride reports
 FORGED_COMMANDS = {Forgery.EMERGENCY_STOP: codec.LEAVE, Forgery.CLOSE_LOOP: codec.ENTER}
 FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
     Forgery.OLD_FIRMWARE: (SOFTWARE, 0.0),

@@ -146,7 +146,7 @@ def test_only_commands_that_stop_a_drive_are_anybody_s(data: bytes, foreign: Map
 
 
 @pytest.mark.parametrize("master", [0, 0xFD])
-def test_a_fault_that_a_robstride_tells_when_asked_ends_the_mode_until_it_is_cleared(master: int) -> None:
+def test_a_fault_that_a_robstride_reports_when_asked_ends_the_mode_until_it_is_cleared(master: int) -> None:
     bench = Bench(ROBSTRIDE)
     bench.enter()
     for node, faults in ((NODE + 1, 0x10), (NODE, 0)):  # another drive's, and none

@@ -59,7 +59,7 @@ def test_the_ranges_are_those_of_the_libraries() -> None:
     assert set(MODELS) == set(DAMIAO) | set(tables) | robstrides
 
 
-def test_a_robstride_answers_with_a_wide_temperature_and_tells_its_faults_apart() -> None:
+def test_a_robstride_answers_with_a_wide_temperature_and_reports_its_faults_apart() -> None:
     """Bytes by section 6 of the User Manuals: half of each range at 37.5 °C; two faults, one, none, an unknown one."""
     ranges = MODELS["RS00"]
     answer = codec.decode_answer(bytes.fromhex("05 c000 c00c 00 0177"), ranges)
@@ -71,8 +71,8 @@ def test_a_robstride_answers_with_a_wide_temperature_and_tells_its_faults_apart(
     for temperature_c in (-12.5, 0.0, 25.6, 145.0):
         given = codec.encode_answer(answer._replace(temperature_c=temperature_c), ranges)
         assert codec.decode_answer(given, ranges).temperature_c == temperature_c and not codec.is_faults(given)
-    told = bytes.fromhex("05 0140 0000 000000")  # bits 0 and 14
-    assert codec.is_faults(told) and codec.error_text(codec.decode_faults(told)) == "over-temperature"
+    reported = bytes.fromhex("05 0140 0000 000000")  # bits 0 and 14
+    assert codec.is_faults(reported) and codec.error_text(codec.decode_faults(reported)) == "over-temperature"
     assert codec.decode_faults(bytes.fromhex("05 0000 0100 000000")) == 2  # bit 16, over-current
     assert codec.decode_faults(bytes.fromhex("05 0000 0000 000000")) == 0
     assert codec.error_text(codec.decode_faults(bytes.fromhex("05 0000 0080 000000")))  # a bit without a name
