@@ -12,7 +12,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  target, lags behind it or stands still, and twice the path of one that moves away. A loop that is not
                  stable moves away twice in each of its cycles. It leaks within 0.3 s. A joint that shoots past its
                  target, out of the mud or thrown by a stone, and comes to rest, moves as far in a few cycles. Each of
-                 its excursions is clearly smaller than the one before on the other side, and does not count.
+                 its excursions is clearly smaller than the one before on the other side, and does not count. One that
+                 is smaller than the one before on its own side ends the count: only its own path remains.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -95,7 +96,8 @@ class MotionMonitor:
         self.unexplained_j = self.away_rad = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
         self._target_rad = self._error_rad = UNKNOWN
-        self._excursion_rad = self._excursion_before_rad = 0.0  # largest errors since the target was passed, and before
+        # largest errors: since the target was passed, before on the other side, and before that on the same side
+        self._excursion_rad = self._excursion_before_rad = self._same_side_rad = 0.0
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
         self.driven_back = 0  # intervals in a row
@@ -165,7 +167,7 @@ class MotionMonitor:
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
         if self._punctual_s < SETTLING_S:
-            self.away_rad = self._excursion_rad = self._excursion_before_rad = 0.0
+            self.away_rad = self._excursion_rad = self._excursion_before_rad = self._same_side_rad = 0.0
             return
         self._watch_error(1.0 - elapsed_s / AWAY_LEAK_S, step_rad, target_rad, target_step_rad)
 
@@ -178,7 +180,10 @@ class MotionMonitor:
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
         self._excursion_before_rad *= kept
         if error_rad * self._error_rad < 0.0:
-            self._excursion_before_rad, self._excursion_rad = self._excursion_rad, 0.0
+            if self._excursion_rad < STABLE_FRACTION * self._same_side_rad:
+                self.away_rad = min(self.away_rad, 2.0 * self._excursion_rad)
+            self._same_side_rad, self._excursion_before_rad = self._excursion_before_rad, self._excursion_rad
+            self._excursion_rad = 0.0
         if lag_rad > self._excursion_rad:
             self._excursion_rad = lag_rad
 

@@ -228,6 +228,22 @@ def test_swings_about_the_target_that_decay_fast_are_no_oscillation(kept: float,
     assert samples.names == expected
 
 
+def test_a_joint_that_had_come_to_rest_may_be_thrown_again() -> None:
+    samples = Samples()
+    for extent_rad in (0.12, -0.16, 0.06, -0.14, 0.03):  # thrown twice, as by mud and a stone
+        for tick in range(20):
+            assert not samples.add(extent_rad * sin(pi * (tick + 0.5) / 20.0), 0.0, 0.0, PERIOD_S)
+    assert not samples.add(-0.001, 0.0, 0.0, PERIOD_S)  # the last excursion, smaller than its own side's, is over
+    assert samples.monitor.away_rad == pytest.approx(2.0 * 0.03, rel=0.01)
+
+
+def test_a_loop_that_swings_unevenly_about_a_lag_is_found() -> None:
+    """A load shifts the middle of an oscillation, so that each second excursion is half of the one before."""
+    samples = Samples()
+    times = [t for t in range(190) if samples.add(0.02 + 0.06 * sin(0.4 * t), 0.0, 0.0, PERIOD_S)]
+    assert times[0] * PERIOD_S < 0.2
+
+
 def test_an_excursion_hides_smaller_ones_on_the_other_side_only_until_it_has_faded() -> None:
     samples = Samples()
     for angle_rad in (0.0, 0.24):
