@@ -81,13 +81,14 @@ def measure_shear(
 ) -> float:
     """Return the forward force on a plate dragged backward at a depth: the mean over the second half of the distance.
 
+    The plate goes down at the same speed before, as in the paper; mud with a memory is then softer by a twentieth.
     Raises ValueError where the first half is too short for all the mud to yield.
     """
     needed_m = 2.0 * SIDEWAYS_YIELD_M * ground.rate_factor(speed_m_s) / cos(sweep_rad)
     if distance_m < needed_m:
         raise ValueError(f"distance_m = {distance_m:g}: must be at least {needed_m:.3f} for the mud to yield")
     cell = LoadCell(ground, geometry, sweep_rad, adduction_rad)
-    cell.depth_m = depth_m
+    cell.lower(depth_m, speed_m_s)
     steps = ceil(distance_m / (speed_m_s * STEP_S))
     forces_n = [cell.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(steps)]
     steady_n = forces_n[steps // 2 :]

@@ -126,6 +126,21 @@ def test_in_stance_only_backward_slip_counts() -> None:
     assert right.stance.slip_m == 0.0
 
 
+def test_a_stance_is_as_deep_as_the_plate_was_while_the_mud_yielded() -> None:
+    """The plate rests at both ends of its arc, and has loaded the mud before that yields after 15 mm."""
+    reference, plant = StrokeReference(), make_plant()
+    arm, geometry = plant.arms[0], plant.parameters.geometry
+    watch(reference, plant, INSERTION)
+    for slip_m, depth_m in ((0.0, 0.01), (0.006, 0.02), (0.012, 0.03), (0.004, 0.034), (0.0, 0.05)):
+        arm.adduction_rad = geometry.adduction_rad(arm.sweep_rad, depth_m)
+        arm.sweep_velocity_rad_s = -slip_m / DT_S / geometry.flipper_length_m
+        watch(reference, plant, STANCE)
+    left, _ = watch(reference, plant, EXTRACTION, SWING)
+    assert left.stance.mean_depth_m == pytest.approx(0.032)
+    assert left.stance.speed_m_s == pytest.approx((1.2 * 0.012 + 0.4 * 0.004) / 0.016)
+    assert (left.stance.deepest_m, left.stance.slip_m) == pytest.approx((0.05, 0.022))
+
+
 def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
     left, right = watch(StrokeReference(), make_plant(-0.01), *STROKES, SWING)
     assert np.isnan([*left.insertion, *left.stance, *left.extraction, *right.stance]).all()

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from control.geometry import FlipperGeometry
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, FlipperContact, attitude_of
+from simulation.mud.ground_contact import Ground
+from simulation.mud.grounds.thixotropic_mud import ThixotropicMud
 from simulation.mud.layer import Layer
 from simulation.test_rig.joint_cell import measure_stroke
 from simulation.test_rig.load_cell import STEP_S, LoadCell, measure_shear
@@ -82,6 +84,14 @@ def test_a_body_that_is_pushed_back_drags_its_flipper_with_the_same_force(sweep_
     for distance_m in (0.06, 0.4):
         shear_n = measure_shear(CLAY, GEOMETRY, sweep_rad, adduction_rad, 0.03, 0.1, distance_m)
         assert force.thrust_n == pytest.approx(shear_n)
+
+
+@pytest.mark.parametrize(("ground", "softest", "firmest"), [(CLAY, 0.999, 1.001), (ThixotropicMud(CLAY), 0.9, 0.97)])
+def test_a_plate_that_comes_in_softens_only_mud_with_a_memory(ground: Ground, softest: float, firmest: float) -> None:
+    there_at_once = LoadCell(ground, GEOMETRY, 0.0, 0.0)
+    there_at_once.depth_m = 0.03
+    forces_n = [there_at_once.step(STEP_S, -0.1, 0.0)[0] for _ in range(4000)]
+    assert softest < measure_shear(ground, GEOMETRY, 0.0, 0.0, 0.03, 0.1) / np.mean(forces_n[2000:]) < firmest
 
 
 def test_a_load_cell_finds_a_crust_where_it_is() -> None:
