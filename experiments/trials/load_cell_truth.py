@@ -1,8 +1,8 @@
 """The true coefficients of a stride: its own strokes, repeated by a plate on a virtual load cell.
 
-Insertion and extraction follow the flipper's own arc, with a cell in the joint that does not feel the plate's face
-(simulation/test_rig); shear goes sideways in the attitude, at the depth and at the speed that the plate had in the mean
-while the mud yielded (reference_sensor.py), after the plate went down there; all to the same depth and at the same speed.
+Insertion and extraction follow the flipper's own arc, to the same depth and at the same speed, with a cell in the joint
+that does not feel the plate's face (simulation/test_rig). For shear the plate goes down and then sideways, in the
+attitude, at the depth and at the speed that it had in the mean while the mud yielded (reference_sensor.py).
 The coefficients are fitted by the laws of plate_integrals.py: τ = k Φ for insertion and for the last three quarters of
 the way up, and F = k_s ∫ζ dA for shear. The second set is of the paper's plate (section II-E), upright and moved
 straight, with F = k V. (A leaning plate that is pushed straight down is neither: its face carries a part of the load,
