@@ -5,9 +5,9 @@ the phase that was commanded for that tick. It closes a stride when swing or ins
 strokes; a stride that a rest interrupts or follows does not count. Speeds are those of the middle of the plate's lower
 edge relative to the mud, so they include the body's motion.
 
-In a stance the means are those of the plate while the mud yields: in the ticks with slip, once it has slipped by the
-distance over which mud yields. (The plate rests at both ends of its arc, where it is 1 to 3 mm shallower, and mud
-loses 2 % of its k_s with each millimetre.) In a stance without so much slip they are those of all of it.
+In a stance the means are those of the plate while the mud yields: in the ticks with slip, once the plate has been
+displaced by the distance over which mud yields. (It rests at both ends of its arc, where it is 1 to 3 mm shallower, and
+mud loses 2 % of its k_s with each millimetre.) In a stance in which it moves to and fro by less, they are those of all.
 """
 
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ class StrokeSums:
         self.reset()
 
     def reset(self) -> None:
-        self._deepest_m, self._slip_m = -inf, 0.0
+        self._deepest_m, self._slip_m, self._to_yield_m = -inf, 0.0, SIDEWAYS_YIELD_M
         self._begin_means()
 
     def _begin_means(self) -> None:
@@ -88,12 +88,15 @@ class StrokeSums:
         self._deepest_m = max(self._deepest_m, snapshot.depth_m)
         speed_m_s = snapshot.speed_m_s
         if self.phase is Phase.STANCE:
-            speed_m_s = -snapshot.forward_m_s if snapshot.forward_m_s < -SLIPPING_M_S else 0.0
-            had_yielded, self._slip_m = self._slip_m >= SIDEWAYS_YIELD_M, self._slip_m + dt_s * speed_m_s
-            if had_yielded and not speed_m_s:
+            forward_m_s = snapshot.forward_m_s
+            speed_m_s = -forward_m_s if forward_m_s < -SLIPPING_M_S else 0.0
+            self._slip_m += dt_s * speed_m_s
+            if self._to_yield_m > 0.0:
+                self._to_yield_m = min(self._to_yield_m + dt_s * forward_m_s, SIDEWAYS_YIELD_M)
+                if self._to_yield_m <= 0.0:
+                    self._begin_means()
+            elif not speed_m_s:
                 return
-            if self._slip_m >= SIDEWAYS_YIELD_M and not had_yielded:
-                self._begin_means()
         self._ticks += 1
         self._sweep += snapshot.sweep_rad
         self._adduction += snapshot.adduction_rad

@@ -141,6 +141,18 @@ def test_a_stance_is_as_deep_as_the_plate_was_while_the_mud_yielded() -> None:
     assert (left.stance.deepest_m, left.stance.slip_m) == pytest.approx((0.05, 0.022))
 
 
+def test_a_plate_that_sticks_and_slips_back_has_not_made_the_mud_yield() -> None:
+    reference, plant = StrokeReference(), make_plant()
+    arm, geometry = plant.arms[0], plant.parameters.geometry
+    watch(reference, plant, INSERTION)
+    for number in range(8):
+        arm.adduction_rad = geometry.adduction_rad(arm.sweep_rad, 0.02 + 0.002 * number)
+        arm.sweep_velocity_rad_s = (-1.0) ** (number + 1) * 0.01 / DT_S / geometry.flipper_length_m
+        watch(reference, plant, STANCE)
+    left, _ = watch(reference, plant, EXTRACTION, SWING)
+    assert (left.stance.mean_depth_m, left.stance.slip_m) == pytest.approx((0.027, 0.04))
+
+
 def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
     left, right = watch(StrokeReference(), make_plant(-0.01), *STROKES, SWING)
     assert np.isnan([*left.insertion, *left.stance, *left.extraction, *right.stance]).all()
