@@ -9,7 +9,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot
 from struct import pack
 from typing import Annotated
 
@@ -47,11 +47,11 @@ def parse_axis(axis: object) -> Direction | None:
         return -x, -y, -z
     if not isinstance(axis, list | tuple) or len(axis) != 3:
         return None
-    if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in axis):
+    if not all(isinstance(each, int | float) and not isinstance(each, bool) and abs(each) < 1e100 for each in axis):
         return None
     x, y, z = axis
     length = hypot(x, y, z)
-    return (x / length, y / length, z / length) if isfinite(length) and length > 0.0 else None
+    return (x / length, y / length, z / length) if length > 0.0 else None
 
 
 def parse_version(text: str) -> NatNetVersion | None:

@@ -105,7 +105,14 @@ def test_an_axis_is_a_unit_vector() -> None:
     assert parse_axis("x") == (1.0, 0.0, 0.0)
     assert parse_axis("-z") == (0.0, 0.0, -1.0)
     assert parse_axis([0, 3, -4.0]) == (0.0, 0.6, -0.8)
-    assert parse_axis("--x") is parse_axis("") is parse_axis(3) is parse_axis(["x", 0, 0]) is None
+    assert (
+        parse_axis("--x")
+        is parse_axis("")
+        is parse_axis(3)
+        is parse_axis(["x", 0, 0])
+        is parse_axis([10**400, 0, 0])
+        is None
+    )
 
 
 def test_the_chosen_source_is_opened(example_text: str, short_folder: Path) -> None:
