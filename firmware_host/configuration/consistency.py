@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from math import ceil, degrees, floor, radians
 from operator import attrgetter
+from pathlib import Path
 
 from control.depth.gait_choice import gaits_and_depths
 from control.geometry import FlipperGeometry
@@ -91,8 +92,8 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
     ):
         if "\0" in path or len(path.encode()) > longest:
             yield f"{key} = {path!r}: must be at most {longest} bytes long, without a zero byte"
-    if not status:
-        yield "status.socket = '': must name a socket"
+    if not Path(status).name:
+        yield f"status.socket = {status!r}: must name a socket"
     if pose and pose == status:
         yield f"pose.socket = {pose!r}: must not be status.socket"
     for key in ("read_group", "drive_group"):

@@ -33,8 +33,7 @@ def rig_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def drive_problems(configuration: Configuration) -> Iterator[str]:
-    # two sections may share one channel
-    wires = {name: f"{bus.interface} {bus.channel} {shown(bus.options)}" for name, bus in configuration.bus.items()}
+    wires = _wires(configuration)
     wired = {joint: replace(each, bus=wires.get(each.bus, each.bus)) for joint, each in configuration.drive.items()}
     joint_at: dict[tuple[str, int], str] = {}
     for joint, drive in configuration.drive.items():
@@ -64,17 +63,26 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
             )
 
 
+def _wires(configuration: Configuration) -> dict[str, str]:
+    """Return what tells the channel of each bus from others: two sections may share one."""
+    return {
+        name: f"{bus.interface} {bus.channel} {shown(sorted(bus.options.items()))}"
+        for name, bus in configuration.bus.items()
+    }
+
+
 def bus_problems(configuration: Configuration) -> Iterator[str]:
     """Check that each bus carries the frames of its drives, and that these do not disturb each other."""
+    wires = _wires(configuration)
     for name, bus in configuration.bus.items():
-        drives = {f"drive.{joint}": each for joint, each in configuration.drive.items() if each.bus == name}
+        drives = {f"drive.{j}": each for j, each in configuration.drive.items() if wires.get(each.bus) == wires[name]}
         kinds = {key: type_of(drive).kind for key, drive in drives.items()}
-        fd = next((key for key, kind in kinds.items() if kind.is_fd), "")
+        fd = next((key for key, kind in kinds.items() if kind.is_fd and drives[key].bus == name), "")
         classic = next((key for key, kind in kinds.items() if not kind.is_fd), "")
         if fd and classic:
             yield (
                 f"{fd}.type = {drives[fd].type!r}: uses CAN FD, which disturbs {classic} ({drives[classic].type}) on"
-                f" the same bus {name!r}; put them on two buses"
+                f" the same channel {bus.channel!r}; put them on two buses"
             )
         elif fd and bus.interface in CLASSIC_INTERFACES:
             yield (

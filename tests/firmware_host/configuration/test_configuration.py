@@ -70,7 +70,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', ["drive.left_sweep.node_id = 0: must be at least 1"]),
     ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
-        "drive.left_sweep.type = 'moteus': uses CAN FD, which disturbs drive.left_adduction (odrive) on the same bus"
+        "drive.left_sweep.type = 'moteus': uses CAN FD, which disturbs drive.left_adduction (odrive) on the same"
     ]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"', [
         "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
@@ -136,6 +136,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
     (SOCKET, "x" * 120, [f"status.socket = '{'x' * 120}': must be at most 97 bytes"]),
     (SOCKET, "", ["status.socket = '': must name a socket"]),
+    (SOCKET, "/", ["status.socket = '/': must name a socket"]),
     ("[status]", '[emergency_stop]\nsource = "key"\n[status]', [
         "emergency_stop.device = '': must be given", "emergency_stop.key = '': must be given"
     ]),
@@ -175,8 +176,13 @@ def test_drives_share_neither_a_missing_bus_nor_an_id() -> None:
         "node_id = 3", "node_id = 2"
     )
     before, _, after = two_sections.rpartition('bus = "a"')
-    shared = problems_of(f'{before}bus = "b"{after}')
+    last = f'{before}bus = "b"{after}'
+    shared = problems_of(last)
     assert shared == ["drive.right_adduction.node_id = 2: right_sweep has the same on bus 'a', the same channel"]
+    options = ("a = 1\nb = 2", "b = 2\na = 1")
+    assert problems_of(f"{last}[bus.a.options]\n{options[0]}\n[bus.b.options]\n{options[1]}\n") == shared
+    other_frames = problems_of(last.replace("[bus.b]", "[bus.b]\ndata_bit_rate_kbit_s = 5000") + 'type = "moteus"\n')
+    assert any("disturbs drive.left_sweep (odrive) on the same channel 'x'" in problem for problem in other_frames)
 
 
 @pytest.mark.parametrize(
