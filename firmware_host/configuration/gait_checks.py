@@ -7,7 +7,7 @@ of 49.5 % water is expected. The acceleration of body and arms is not in it: it 
 """
 
 from collections.abc import Iterator
-from math import cos, degrees, floor, hypot, sin
+from math import ceil, cos, degrees, floor, hypot, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
@@ -21,6 +21,7 @@ from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 
 POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
+ROUNDING_M = 1e-9  # of a depth on a path
 PEAK_FRACTION = 0.5  # of k_e Φ
 EXPECTED_N_M3 = {"k_p": 0.82e6, "k_s": 0.46e6, "k_e": 1.45e6}  # 49.5 % water, docs/results/loadcell.json
 SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
@@ -115,9 +116,13 @@ def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud:
         low_deg, high_deg = limits.sweep_min_deg, limits.sweep_max_deg
         yield f"{where}: must be from {low_deg:g} to {high_deg:g} degrees, limits.sweep_min_deg and sweep_max_deg"
     if not geometry.is_reachable(sweep_rad, depth_m):
-        deepest_cm = floor(1e4 * geometry.deepest_m(sweep_deg)) / 100.0
-        yield f"{where}: out of reach, must be at most {deepest_cm:g} cm"
+        deepest_m = geometry.deepest_m(sweep_deg)
+        deepest_cm, highest_m = floor(1e4 * deepest_m) / 100.0, -deepest_m - 2.0 * geometry.axis_height_m
+        yield f"{where}: out of reach, must be from {ceil(1e4 * highest_m) / 100.0:g} to {deepest_cm:g} cm"
         return
+    if depth_m > configuration.adaptation.max_depth_m + ROUNDING_M:  # a way-point in metres, or half an ellipse
+        most_cm = 100.0 * configuration.adaptation.max_depth_m
+        yield f"{where}: must be at most {most_cm:g} cm deep, adaptation.max_depth_m"
     lift_rad = geometry.adduction_rad(sweep_rad, depth_m)
     lift_deg, low_deg, high_deg = degrees(lift_rad), limits.adduction_min_deg, limits.adduction_max_deg
     if not low_deg <= lift_deg <= high_deg:
@@ -148,13 +153,13 @@ def _innermost_m(geometry: FlipperGeometry, sweep_rad: float, lift_rad: float) -
 def _current_problems(pose: Pose, lift_rad: float, configuration: Configuration, mud: MudEstimate) -> Iterator[str]:
     """Compare the currents against mud that yields with those that the drives may have."""
     constants_nm_a = configuration.torque_constants_nm_a[:2]
-    largest_a = min(drive.current_limit_a for drive in configuration.flipper_drives)
+    largest_nm = configuration.limits.torque_nm  # which every drive can exert: drive_consistency.py
     torques_nm = expected_torques_nm(pose, lift_rad, configuration, mud)
     for axis, torque_nm, constant_nm_a in zip(("sweep", "adduction"), torques_nm, constants_nm_a, strict=True):
-        if torque_nm > largest_a * constant_nm_a:
+        if torque_nm > largest_nm:
             yield (
                 f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor, must be at most"
-                f" {largest_a:.1f} A ({largest_a * constant_nm_a:.2f} N·m); a smaller depth takes less"
+                f" {largest_nm / constant_nm_a:.1f} A ({largest_nm:.2f} N·m); a smaller depth takes less"
             )
 
 

@@ -1,5 +1,6 @@
 """Gaits that no robot may walk: each is refused with one message that names phase, key and bound."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -83,6 +84,32 @@ def test_a_key_without_its_unit_or_out_of_bounds_is_named(changes: dict[str, Any
     with pytest.raises(ConfigurationError) as refused:
         read_gait({"name": "mine.toml", "phase": stroke(**changes)})
     assert any(each.startswith(f"mine.toml: {key}") for each in refused.value.problems)
+
+
+def test_the_bound_of_a_height_out_of_reach_is_within_reach(configuration: Configuration) -> None:
+    """Refused at least, since the arm may not rise as far: not as out of reach."""
+    (problem, *_) = problems(stroke(3, way_points=[point(30.0, -0.2)]), configuration)
+    (highest_cm,) = re.findall(r"out of reach, must be from (\S+) to 5.03 cm", problem)
+    higher = problems(stroke(3, way_points=[point(30.0, float(highest_cm) / 100.0)]), configuration)
+    assert higher and not any("out of reach" in each for each in higher)
+
+
+def test_no_way_point_is_deeper_than_a_stride_may_be(configuration: Configuration) -> None:
+    shallow = replace(configuration, adaptation=replace(configuration.adaptation, max_depth_m=0.03))
+    assert not problems(stroke(), shallow)
+    deeper = problems(stroke(way_points=[point(-30.0, 0.031)]), shallow)
+    assert "must be at most 3 cm deep, adaptation.max_depth_m" in deeper[0]
+
+
+def test_joints_of_other_torque_constants_may_have_the_same_torque(configuration: Configuration) -> None:
+    weak = replace(configuration, limits=replace(configuration.limits, torque_nm=0.4))
+    adduction = {
+        joint: replace(each, torque_constant_nm_a=0.166)
+        for joint, each in weak.drive.items()
+        if joint.endswith("adduction")
+    }
+    assert not problems(stroke(), weak)
+    assert not problems(stroke(), replace(weak, drive=weak.drive | adduction))
 
 
 def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuration: Configuration) -> None:
