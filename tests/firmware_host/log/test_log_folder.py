@@ -44,6 +44,8 @@ def test_names_sort_by_time_and_then_by_segment(tmp_path: Path) -> None:
         names += [segment_path(first, number).name for number in (0, 1, 2, 10)]
     assert names == sorted(set(names))
     assert all("mud_skipper_" in name for name in names)
+    later = make_files(tmp_path, DONE, "run-9999", "run-10000_A_3", "run-10001", "runs-0000")
+    assert log_files(tmp_path, DONE) == later
 
 
 @pytest.mark.parametrize(
