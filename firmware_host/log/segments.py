@@ -196,13 +196,15 @@ class LogSegments:
         """Begin a new file before these rows where the present one is too long or too large."""
         if self._file is None or not rows:
             return
+        number, row = rows[0]
+        begin_s = ROW_KINDS[number].stamp_s(row)
         if self._first_stamp_s is None:
-            number, row = rows[0]
-            self._first_stamp_s = ROW_KINDS[number].stamp_s(row)
+            self._first_stamp_s = begin_s
         long = self._latest_stamp_s - self._first_stamp_s >= self._parameters.segment_s
         if long or self._file.length >= self._parameters.segment_bytes:
             self._trial = {} if self._thinning.resting else self._trial  # the hours after a trial are not of it
             self._begin_next()
+            self._first_stamp_s = begin_s
 
     def _begin_next(self) -> None:
         """End this file and begin the next one; a disk that refuses is tried again later."""
@@ -246,7 +248,10 @@ class LogSegments:
         quota_bytes, fraction = self._parameters.quota_bytes, self._parameters.min_free_fraction
         with suppress(OSError):  # a log that cannot be deleted shows as a full disk
             for message in delete_by_quota(self._folder, quota_bytes, fraction):
-                self._write([self._event(message)])
+                if self._file is None:
+                    self._deleted.append(message)
+                else:
+                    self._write([self._event(message)])
 
     @property
     def repairing(self) -> int:

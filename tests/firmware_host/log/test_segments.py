@@ -56,6 +56,15 @@ def test_a_segment_ends_by_its_size(tmp_path: Path) -> None:
     assert all(path.stat().st_size < 200_000 for path in log_files(tmp_path, DONE))
 
 
+def test_no_segment_is_longer_than_configured(tmp_path: Path) -> None:
+    log = make_segments(tmp_path)
+    for number in range(0, 1500, 100):
+        log.write(make_ticks(number, number + 100, Mode.WALKING))
+    assert log.close()
+    stamps_s = [read_log(path).ticks["stamp_s"] for path in log_files(tmp_path, DONE)]
+    assert max(each[-1] - each[0] for each in stamps_s) < BY_TIME.segment_s
+
+
 def make_report(kind: str, trial: dict[str, str], tick: int = 0) -> tuple[int, bytes]:
     return make_event(OperatorReport(kind, datetime.now(UTC), "uid 0", to_json(trial)).event, tick / 380)
 
@@ -268,6 +277,26 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     ]
     left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
     assert left.ticks["tick"].tolist() == list(range(10))  # complete to the last row, not only to the last chunk
+
+
+def test_a_log_deleted_while_the_disk_refuses_is_reported_and_is_no_missing_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_old_logs(tmp_path)
+    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+    monkeypatch.setattr(log_segments, "QUOTA_INTERVAL_S", 0.0)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=9000))
+    with monkeypatch.context() as patch:
+        patch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+        patch.setattr(os, "write", full)
+        log.write(make_ticks(0, 10))
+    assert log.dropped == 10
+    assert log.close()
+    events = [event["text"] for event in read_log(tmp_path / DONE / "run-0000.mcap").events]
+    assert events == [
+        "room for logs: 1.mcap was deleted, 5000 bytes, not copied",
+        "rows missing here: 10, the log could not be written: No space left on device",
+    ]
 
 
 def test_the_quota_frees_the_oldest_and_says_so(tmp_path: Path) -> None:
