@@ -14,7 +14,9 @@ class LogParameters:
     segment_s: Annotated[float, Bounds(1.0, 86400.0), Meaning("longest time in one file")] = (
         600.0  # a file that viewers load at once
     )
-    segment_bytes: Annotated[int, Bounds(100_000, 2_000_000_000), Meaning("largest size of one file")] = 64_000_000
+    segment_bytes: Annotated[
+        int, Bounds(100_000, 2_000_000_000), Meaning("size of a file at which the next one begins")
+    ] = 64_000_000
     quota_bytes: Annotated[int, Bounds(0, 10**15), Meaning("above which the oldest logs are deleted; 0: no quota")] = (
         8_000_000_000  # a day of torque
     )
