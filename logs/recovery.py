@@ -22,7 +22,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from firmware_host.log.log_file import LogFile, lock_file
-from firmware_host.log.log_folder import BROKEN, PART, finished_path, move_file, unfinished_files
+from firmware_host.log.log_folder import BROKEN, ENDING, PART, finished_path, move_file, unfinished_files
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS
 from firmware_host.log.schema import LayoutError
 from logs.files.file_pass import OTHER_VERSION, FilePass
@@ -124,7 +124,7 @@ def recover_log(path: Path, watch: Watch = unwatched) -> Recovered:
     """Recover one file. Raises LogError, and OSError; BlockingIOError where the log's writer lives."""
     with path.open("rb") as file:
         lock_file(file.fileno(), path)
-        if path.name.endswith(PART) or not path.stat().st_size:
+        if path.name.endswith(f"{ENDING}{PART}") or (ENDING in path.name and not path.stat().st_size):
             path.unlink()
             return Recovered(path, 0, 0, "an interrupted recovery, removed" if PART in path.name else "empty, removed")
         target = finished_path(path.with_name(path.name.removesuffix(BROKEN)))

@@ -95,6 +95,15 @@ def test_a_recovery_that_was_cut_off_is_done_again(tmp_path: Path) -> None:
     assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
 
 
+@pytest.mark.parametrize(("name", "contents"), [("film.part", b"half"), ("notes", b"")])
+def test_a_file_that_is_no_log_by_its_name_is_not_removed(tmp_path: Path, name: str, contents: bytes) -> None:
+    path = tmp_path / name
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="left as it is"):
+        recover_log(path)
+    assert path.read_bytes() == contents
+
+
 def test_a_recovery_cut_off_at_its_very_end_recovers_nothing_twice(tmp_path: Path) -> None:
     path = make_cut_log(tmp_path)
     contents = path.read_bytes()
