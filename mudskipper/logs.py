@@ -9,6 +9,7 @@ from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
 from firmware_host.trial import METADATA_KEY, OperatorReport, from_json
+from logs.files.log_error import LogError
 from logs.files.log_reader import read_logs
 from logs.files.log_summary import operator_reports, wall_offset_ns
 from logs.flat_columns import stack_rows
@@ -98,4 +99,7 @@ def replay(
 
 
 def _as_paths(path: Paths) -> tuple[Path, ...]:
-    return (Path(path),) if isinstance(path, str | Path) else tuple(Path(each) for each in path)
+    paths = (Path(path),) if isinstance(path, str | Path) else tuple(Path(each) for each in path)
+    if not paths:
+        raise LogError("no log is given")
+    return paths

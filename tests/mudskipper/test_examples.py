@@ -77,6 +77,12 @@ def test_fields_without_the_stamp_become_a_table_with_numbered_rows(log: mudskip
         assert [*frame.columns] == ["mode", "stride"] and frame.index[-1] == len(log.ticks) - 1
 
 
+def test_no_log_at_all_is_refused_with_a_sentence() -> None:
+    for read in (mudskipper.open_log, mudskipper.replay):
+        with pytest.raises(mudskipper.LogError, match="no log is given"):
+            read([])
+
+
 def test_a_column_is_a_plain_array(log: mudskipper.OpenedLog) -> None:
     assert type(log.ticks["stamp_s"]) is type(log.ticks["angle_rad"]) is np.ndarray
 
