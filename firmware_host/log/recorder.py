@@ -30,7 +30,7 @@ from firmware_host.log.log_folder import ACTIVE, present_path, unfinished_files
 from firmware_host.log.row_records import HEADER, pack_record
 from firmware_host.log.rows import EVENT, EVENT_KIND
 
-PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
+PIPE_BYTES = 1 << 20  # 2,304 ticks, nine to a page: six seconds at 380 Hz
 STAMP = struct.Struct("<4xd")  # every row of this version: four bytes of encapsulation, then its stamp
 REPORT_BYTES = 256  # left free for the report of a loss, which is sent together with a row
 LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES

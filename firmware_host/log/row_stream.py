@@ -35,7 +35,7 @@ MOST_SUBSCRIBERS = {Level.READ: 6, Level.DRIVE: 8}  # at which one more of this 
 MOST_ACCEPTS = 32  # at once
 BACKLOG = 128  # connections that wait to be accepted
 PACKET_BYTES = 32 * 1024  # less than the kernel's smallest usual buffer
-BUFFER_BYTES = 512 * 1024  # of one subscriber: two seconds of rows; the kernel may allow less
+BUFFER_BYTES = 512 * 1024  # of one subscriber: three seconds of rows; the kernel may allow less
 
 
 def stream_path(status_socket: Path) -> Path:
