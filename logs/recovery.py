@@ -131,6 +131,7 @@ def recover_log(path: Path, watch: Watch = unwatched) -> Recovered:
         present_rows = _rows_of_whole(target) if target != path else None
         if (own_rows := _rows_of_whole(path, watch)) is not None and present_rows is None:
             if target != path:  # its writer ended between its last byte and the renaming
+                _require_free(path, target)
                 move_file(path, target)
             return Recovered(target, 0, 0, "is whole")
         salvage = salvage_rows(path, file, watch)
@@ -150,9 +151,17 @@ def _rows_of_whole(path: Path, watch: Watch = unwatched) -> int | None:
     return None
 
 
+def _require_free(path: Path, *names: Path) -> None:
+    """Raise LogError where a recovery would overwrite another log, which may have more rows."""
+    for name in names:
+        if name != path and name.exists():
+            raise LogError(f"{path}: left as it is: {name} is another log; rename one of them")
+
+
 def _rewrite(path: Path, target: Path, file: BinaryIO, salvage: Salvage, watch: Watch) -> Recovered:
     """Raises OSError, and LogError for a file that was changed meanwhile, which stays as NAME.broken."""
     broken = path if path.name.endswith(BROKEN) else path.with_name(path.name + BROKEN)
+    _require_free(path, broken, target)
     path.rename(broken)
     part = broken.with_name(target.name + PART)
     part.unlink(missing_ok=True)

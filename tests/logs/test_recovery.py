@@ -114,6 +114,17 @@ def test_a_recovery_cut_off_at_its_very_end_recovers_nothing_twice(tmp_path: Pat
     assert (unfinished_files(tmp_path), done.read_bytes()) == ([], before)
 
 
+@pytest.mark.parametrize(("named", "other"), [("a.mcap", "a.mcap.broken"), ("a.mcap.broken", "a.mcap")])
+def test_a_recovery_overwrites_no_other_cut_log(tmp_path: Path, named: str, other: str) -> None:
+    contents = make_cut_log(tmp_path / "robot").read_bytes()
+    (tmp_path / named).write_bytes(contents[:20000])
+    (tmp_path / other).write_bytes(contents)
+    with pytest.raises(LogError, match=f"left as it is: {tmp_path / other} is another log"):
+        recover_log(tmp_path / named)
+    assert (tmp_path / other).read_bytes() == contents
+    assert (tmp_path / named).read_bytes() == contents[:20000]
+
+
 def test_a_whole_file_that_was_not_renamed_is_only_renamed(tmp_path: Path) -> None:
     log = make_file(tmp_path / "run-0000.mcap")
     path = log.finish()
