@@ -17,11 +17,11 @@ class LogParameters:
     segment_bytes: Annotated[
         int, Bounds(100_000, 2_000_000_000), Meaning("size of a file at which the next one begins")
     ] = 64_000_000
-    quota_bytes: Annotated[int, Bounds(0, 10**15), Meaning("above which the oldest logs are deleted; 0: no quota")] = (
-        8_000_000_000  # a day of torque
-    )
+    quota_bytes: Annotated[
+        int, Bounds(0, 10**15), Meaning("above which old logs are deleted, copied ones first; 0: no quota")
+    ] = 8_000_000_000  # a day of torque
     min_free_fraction: Annotated[
-        float, Bounds(0.0, 0.9), Meaning("of the disk; below it the oldest logs are deleted")
+        float, Bounds(0.0, 0.9), Meaning("of the disk, below which old logs are deleted too")
     ] = 0.1
     rest_hz: Annotated[float, Bounds(0.0, RATE_HZ), Meaning("rows per second without torque; 0: every tick")] = 10.0
     rest_full_s: Annotated[
