@@ -1,8 +1,10 @@
 """The true coefficients of a stride: its own strokes, repeated by a plate on a virtual load cell.
 
 Insertion and extraction follow the flipper's own arc, to the same depth and at the same speed, with a cell in the joint
-that does not feel the plate's face (simulation/test_rig). For shear the plate goes down and then sideways, in the
-attitude, at the depth and at the speed that it had in the mean while the mud yielded (reference_sensor.py).
+that does not feel the plate's face (simulation/test_rig). Between them that plate moves across its face as far as it
+did in the stance, which softens mud with a memory. For shear the plate points straight out, goes down and then
+backward, with the lean, at the depth and at the speed that it had in the mean while the mud yielded
+(reference_sensor.py).
 The coefficients are fitted by the laws of plate_integrals.py: τ = k Φ for insertion and for the last three quarters of
 the way up, and F = k_s ∫ζ dA for shear. The second set is of the paper's plate (section II-E), upright and moved
 straight, with F = k V. (A leaning plate that is pushed straight down is neither: its face carries a part of the load,
@@ -71,7 +73,7 @@ def _stiffness(
     cell: LoadCell | JointCell = JointCell(stride.ground, geometry, stroke.sweep_rad, stride.surface_m, relaxation)
     if upright:
         cell = LoadCell(stride.ground, geometry, 0.0, 0.0, relaxation)
-    down, up = measure_stroke(cell, stroke.deepest_m, stroke.speed_m_s, hold_s)
+    down, up = measure_stroke(cell, stroke.deepest_m, stroke.speed_m_s, hold_s, stride.stance.path_m)
     fitted_m = stroke.deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * stroke.deepest_m
     rows = [row for row in (down if sign > 0.0 else up) if 0.0 < row[0] <= fitted_m]
     square = fsum(law * law for _, law, _ in rows)

@@ -33,6 +33,7 @@ class StrokeTruth(NamedTuple):
     speed_m_s: float  # mean over the distance; in stance backward along the track, over the ticks with slip
     slip_m: float  # in stance: the distance in all ticks with slip; NaN in the other strokes
     mean_depth_m: float
+    path_m: float = 0.0  # of the edge through the mud, in any direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,8 @@ class StrokeSums:
         self.reset()
 
     def reset(self) -> None:
-        self._deepest_m, self._slip_m, self._to_yield_m = -inf, 0.0, SIDEWAYS_YIELD_M
+        self._deepest_m, self._slip_m, self._moved_m = -inf, 0.0, 0.0
+        self._to_yield_m = SIDEWAYS_YIELD_M
         self._begin_means()
 
     def _begin_means(self) -> None:
@@ -87,6 +89,7 @@ class StrokeSums:
             return
         self._deepest_m = max(self._deepest_m, snapshot.depth_m)
         speed_m_s = snapshot.speed_m_s
+        self._moved_m += dt_s * speed_m_s
         if self.phase is Phase.STANCE:
             forward_m_s = snapshot.forward_m_s
             speed_m_s = -forward_m_s if forward_m_s < -SLIPPING_M_S else 0.0
@@ -114,6 +117,7 @@ class StrokeSums:
             self._speed_m2_s / self._path_m if self._path_m > 0.0 else UNKNOWN,
             self._slip_m if self.phase is Phase.STANCE else UNKNOWN,
             self._depths_m / self._ticks,
+            self._moved_m,
         )
 
 

@@ -7,7 +7,7 @@ plate at one sweep angle, with one speed of its lower edge and in equal steps of
 all forces within the plate's plane. The contact model is the same as under the robot.
 """
 
-from math import degrees, hypot
+from math import ceil, degrees, hypot
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import stroke_moment_m4, submerged_plate
@@ -16,6 +16,7 @@ from simulation.mud.ground_contact import Ground
 from simulation.test_rig.load_cell import Curve, LoadCell
 
 STEP_M = 0.0001
+SLIDE_STEP_M = 0.001
 HOLD_STEP_S = 0.0005
 
 
@@ -50,6 +51,12 @@ class JointCell:
             curve.append((self._depth_m, stroke_moment_m4(self._geometry, plate, self._sweep_rad), lifting_nm))
         return curve
 
+    def slide(self, path_m: float, speed_m_s: float) -> None:
+        """Move the plate back across its face, in place."""
+        steps = ceil(path_m / SLIDE_STEP_M)
+        for _ in range(steps):
+            self._step(path_m / steps / speed_m_s, 0.0, -speed_m_s / self._geometry.flipper_length_m)
+
     def hold(self, hold_s: float) -> None:
         for _ in range(round(hold_s / HOLD_STEP_S)):
             self._step(HOLD_STEP_S, 0.0)
@@ -61,19 +68,20 @@ class JointCell:
         self._adduction_rad = angle_rad
         return self._step(path_m / speed_m_s, turn_rad)
 
-    def _step(self, dt_s: float, turn_rad: float) -> float:
+    def _step(self, dt_s: float, turn_rad: float, sweep_rad_s: float = 0.0) -> float:
         geometry, sweep_rad = self._geometry, self._sweep_rad
         attitude = attitude_of(geometry, sweep_rad, self._adduction_rad, self._surface_m)
-        twist = twist_of(geometry, ArmMotion(sweep_rad, self._adduction_rad, adduction_rad_s=turn_rad / dt_s))
+        twist = twist_of(geometry, ArmMotion(sweep_rad, self._adduction_rad, sweep_rad_s, turn_rad / dt_s))
         wrench = self._plate.step(dt_s, self._ground, attitude, twist)
         within = wrench._replace(normal_n=0.0, normal_outward_nm=0.0, normal_upward_nm=0.0)
         return contact_force(geometry, sweep_rad, within).adduction_nm
 
 
 def measure_stroke(
-    cell: LoadCell | JointCell, depth_m: float, speed_m_s: float, hold_s: float = 0.0
+    cell: LoadCell | JointCell, depth_m: float, speed_m_s: float, hold_s: float = 0.0, slide_m: float = 0.0
 ) -> tuple[Curve, Curve]:
-    """Measure from just above the mud down to a depth, and after a hold up again."""
+    """Measure from just above the mud down to a depth, and after a slide across the face and a hold up again."""
     down = cell.lower(depth_m, speed_m_s)
+    cell.slide(slide_m, speed_m_s)
     cell.hold(hold_s)
     return down, cell.lower(cell.clear_m, speed_m_s)

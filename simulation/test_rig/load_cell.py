@@ -65,6 +65,10 @@ class LoadCell:
             curve.append((self.depth_m, self._geometry.plate_thickness_m * part.area_m2, upward_n))
         return curve
 
+    def slide(self, path_m: float, speed_m_s: float) -> list[float]:
+        """Drag the plate backward; return the forward force after each step."""
+        return [self.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(ceil(path_m / (speed_m_s * STEP_S)))]
+
     def hold(self, hold_s: float) -> None:
         for _ in range(round(hold_s / STEP_S)):
             self.step(STEP_S, 0.0, 0.0)
@@ -89,7 +93,6 @@ def measure_shear(
         raise ValueError(f"distance_m = {distance_m:g}: must be at least {needed_m:.3f} for the mud to yield")
     cell = LoadCell(ground, geometry, sweep_rad, adduction_rad)
     cell.lower(depth_m, speed_m_s)
-    steps = ceil(distance_m / (speed_m_s * STEP_S))
-    forces_n = [cell.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(steps)]
-    steady_n = forces_n[steps // 2 :]
+    forces_n = cell.slide(distance_m, speed_m_s)
+    steady_n = forces_n[len(forces_n) // 2 :]
     return fsum(steady_n) / len(steady_n)

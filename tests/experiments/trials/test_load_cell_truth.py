@@ -8,7 +8,7 @@ and sideways N_p s_u on the face. k is the least-squares slope of F against V = 
 """
 
 from dataclasses import replace
-from math import cos, hypot, nan, radians, sin
+from math import cos, exp, hypot, nan, radians, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ from simulation.mud.clay import (
     clay_of_water,
     rate_factor,
 )
+from simulation.mud.grounds.thixotropic_mud import ThixotropicMud
 
 GEOMETRY = FlipperGeometry()
 EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m
@@ -171,6 +172,25 @@ def test_in_stance_the_plate_is_square_to_its_path() -> None:
         == truth(stride(stance=turned._replace(sweep_rad=0.0))).leaning["k_s"]
     )
     assert truth(stride(stance=turned)).leaning["k_s"] != truth(stride(stance=turned)).upright["k_s"]
+
+
+@pytest.mark.parametrize("plate", Plates._fields)
+def test_mud_with_a_memory_is_as_soft_on_the_way_up_as_the_stance_left_it(plate: str) -> None:
+    """Each plate's width of travel takes a factor exp(-Γ) of the structure λ, and the strength goes with 1 + λ.
+
+    They agree to 2 %, because λ is that half-way up, on a straight path.
+    """
+    mud, path_m = ThixotropicMud(CLAY), 0.1
+    of = stride(ground=mud, insertion=leaning(), extraction=leaning())
+    slid = replace(of, stance=of.stance._replace(path_m=path_m))
+    before, after = (getattr(truth(each), plate) for each in (of, slid))
+    loss_per_m = mud.thixotropy.loss_per_strain / GEOMETRY.plate_width_m
+    structure = exp(-loss_per_m * (DEPTH_M + DEPTH_M / 2.0))  # half-way up
+    softer = (1.0 + structure * exp(-loss_per_m * path_m)) / (1.0 + structure)
+    assert after["k_e"] == pytest.approx(softer * before["k_e"], rel=0.02)
+    assert (after["k_p"], after["k_s"]) == (before["k_p"], before["k_s"])
+    clay = replace(slid, ground=CLAY)
+    assert truth(clay) == truth(replace(clay, stance=of.stance))
 
 
 # strokes that did not happen

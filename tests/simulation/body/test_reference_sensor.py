@@ -122,6 +122,7 @@ def test_in_stance_only_backward_slip_counts() -> None:
     left, right = watch(reference, plant, EXTRACTION, SWING)
     assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # weighted by distance
     assert left.stance.slip_m == pytest.approx(DT_S * 0.4)
+    assert left.stance.path_m == pytest.approx(DT_S * 0.919)  # all motion works the mud
     assert isnan(right.stance.speed_m_s)  # it went forward with the body
     assert right.stance.slip_m == 0.0
 
@@ -155,7 +156,8 @@ def test_a_plate_that_sticks_and_slips_back_has_not_made_the_mud_yield() -> None
 
 def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
     left, right = watch(StrokeReference(), make_plant(-0.01), *STROKES, SWING)
-    assert np.isnan([*left.insertion, *left.stance, *left.extraction, *right.stance]).all()
+    for *means, path_m in (left.insertion, left.stance, left.extraction, right.stance):
+        assert np.isnan(means).all() and path_m == 0.0
 
 
 def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
