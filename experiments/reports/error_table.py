@@ -7,6 +7,7 @@ and more is a claim that is too small. A second table compares the plate as the 
 upright plate of the paper's load cell.
 """
 
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ def _errors(group: DataFrame) -> Row:
         "bounds_hold": _statistic(np.mean, bounds_hold),  # fraction of bounds below the truth, within their errors
         "bound_over_truth": _statistic(np.median, bounds["value"] / bounds["truth"]),
         "not_valid": len(group) - len(values) - len(bounds),
-        "truth_n_m3": round(float(np.median(group["truth"]))),
+        "truth_n_m3": None if isnan(truth := float(group["truth"].median())) else round(truth),
     }
 
 

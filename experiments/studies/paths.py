@@ -125,7 +125,7 @@ def _compared(closed: Sequence[StrideEstimate], truths: FlipperTruths, **keys: A
             before, row["predicted"] = getattr(remembered, row["coefficient"]), UNKNOWN
             if row["kind"] == "value" and before is not None and not before.at_least:
                 row["predicted"] = log(before.at(row["depth_m"])[0] / row["value"])
-            if row["truth"] is not None:
+            if row["truth"] is not None or row["kind"] == "not valid":  # which may name no depth
                 yield row
         knowledge.update([stride])
 
