@@ -85,14 +85,15 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     robot = FailingRobot(configuration, track, seed, plant=plant, drives=drives)
     order = WalkOrder(chance.choice(DEPTHS_M), chance.random() < 0.7)
     robot.arm()
-    faults, strides = [], 0
+    faults, strides, stride = [], 0, -1
     while robot.now_s < WALK_S and robot.loop.mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING):
         _operate(robot, chance, order)
         robot.step()
         faults += [
             (robot.now_s, fault.name) for fault in robot.loop.faults.begun if fault.kind.reaction > Reaction.WARN
         ]
-        strides = max(strides, robot.loop.controller.target.stride + 1)
+        before, stride = stride, robot.loop.controller.target.stride  # each walk counts from 0
+        strides += stride > before
     held, alarms = counted_apart(faults, (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD)
     return {
         "duration_s": robot.now_s,

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -11,11 +13,14 @@ from pandas import DataFrame
 
 from command_line import exit_codes
 from command_line.main import main
+from control.controller import WalkOrder
+from control.modes import Mode, Request
 from drivers.fault_injection.failure_table import PHASES
 from experiments.study.result import Result
 from experiments.study.session import Ending
 from experiments.study.trials import Trials
 from verification.faults.evaluation import Cell
+from verification.faults.failing_robot import FailingRobot
 from verification.studies import healthy_walks
 from verification.studies.faults import FAULTS, study
 
@@ -108,6 +113,22 @@ def test_a_walk_in_which_nothing_fails_has_no_alarm(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(healthy_walks, "WALK_S", 4.0)
     walked = healthy_walks.walk(3)
     assert walked["strides"] > 0 and walked["alarms"] == walked["held"] == []
+
+
+def test_the_strides_of_all_walks_of_a_minute_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    def operate(robot: FailingRobot, chance: Random, order: WalkOrder) -> None:
+        loop, stride = robot.loop, robot.loop.controller.target.stride
+        if loop.mode is Mode.HOLD:
+            loop.request(Request.WALK, robot.now_s, order)
+        elif loop.mode is Mode.WALKING and stride == 1:
+            loop.request(Request.STOP, robot.now_s)
+        begun.append(stride)
+
+    begun: list[int] = []
+    monkeypatch.setattr(healthy_walks, "_operate", operate)
+    monkeypatch.setattr(healthy_walks, "WALK_S", 9.0)
+    strides = healthy_walks.walk(3)["strides"]
+    assert strides == sum(now != before and now >= 0 for before, now in pairwise(begun)) > max(begun) + 1
 
 
 def test_a_false_alarm_before_the_mud_holds_a_flipper_counts() -> None:
