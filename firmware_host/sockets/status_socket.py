@@ -160,6 +160,8 @@ class StatusSocket:
                 listener.waiting[descriptor] = None
             except MalformedError as problem:
                 self._reject(client, str(problem))
+            except BlockingIOError:  # the event was of a dropped client, whose descriptor this one got since
+                pass
             except OSError:
                 return self._drop(descriptor)
         return self._flush(listener, descriptor)

@@ -167,6 +167,16 @@ def test_among_users_with_equal_connections_the_newcomer_s_user_loses_one(served
     assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # the end is reported
 
 
+def test_a_newcomer_is_not_dropped_for_an_event_of_the_client_whose_descriptor_it_got(served: Served) -> None:
+    others = [connect(served, OTHER_USER) for _ in range(MOST_CLIENTS)]
+    serve(served, MOST_CLIENTS)
+    newcomers = [connect(served, READER) for _ in range(2)]  # both are accepted in the tick that also hears others[0]
+    others[0].sendall(ECHO)
+    served.tick()
+    assert served.counters["dropped_for_others"] == 2 and not is_open(others[0])
+    assert all(map(is_open, newcomers)) and served.counters["clients"] == MOST_CLIENTS
+
+
 def test_among_single_connections_the_least_privileged_is_dropped(served: Served) -> None:
     operator = connect(served, OPERATOR)
     others = [connect(served, Peer(9, 2000 + index, frozenset())) for index in range(MOST_CLIENTS - 1)]
