@@ -58,11 +58,9 @@ class LeasedWalk:
         raise CallRefusedError(f"{cause}{PAUSE}")
 
     def clear(self) -> str:
-        """Clear faults, refused while another program has the lease."""
+        """Clear faults, for which no lease is needed."""
         with StatusClient(self._socket, ANSWER_S) as client:
-            answer = str(client.call("clear", lease_s=LEASE_S))
-            client.call("release")
-            return answer
+            return str(client.call("clear"))
 
     def end(self, method: str) -> str:
         """Stop or disarm, for which no lease is needed. Raises CallRefusedError unless every drive has confirmed it."""

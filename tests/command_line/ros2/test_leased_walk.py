@@ -105,5 +105,9 @@ def test_a_refused_order_takes_no_lease(called: Called) -> None:
     called.wait_for(Mode.IDLE)
     with pytest.raises(CallRefusedError, match="arm"):
         called.call()
+    with StatusClient(called.socket) as operator:
+        operator.call("lease", for_s=10.0)
+        assert called.walk.clear() == "accepted"  # no lease is needed, and the answer says so
+        operator.call("release")
     called.operate("arm", force="uncalibrated")
     called.wait_for(Mode.HOLD)
