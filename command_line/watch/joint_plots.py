@@ -46,15 +46,16 @@ class View:
     def zoom(self, factor: float) -> None:
         self.column_s = min(max(self.column_s * factor, self._shortest_s), MOST_ZOOM * self._shortest_s)
 
-    def scroll(self, columns: float, history: History) -> None:
-        """Move the window; at the newest sample it follows the time again."""
+    def scroll(self, screens: float, history: History, width: int) -> None:
+        """Move the window, back to where it begins with the oldest sample; at the newest it follows the time again."""
         first_s, last_s = history.samples[0].time_s, history.samples[-1].time_s
-        end_s = max((self.end_s or last_s) + columns * self.column_s, first_s)
+        span_s = _columns_in(width) * self.column_s
+        end_s = max((self.end_s or last_s) + screens * span_s, first_s + span_s)
         self.end_s = None if end_s >= last_s else end_s
 
     def text(self, history: History, width: int, height: int) -> Text:
         """Return a plot for each joint, above the time of day at both ends."""
-        signal, columns = SIGNALS[self.signal], max(width - NAME - RANGE - 1, 1)
+        signal, columns = SIGNALS[self.signal], _columns_in(width)
         names = [drive["joint"] for drive in history.status["drives"]]
         end_s = history.samples[-1].time_s if self.end_s is None else self.end_s
         begin_s = end_s - columns * self.column_s
@@ -80,6 +81,10 @@ class View:
                     if value is not None and (before is None or abs(signal.shown(value)) > abs(before)):
                         row[column] = signal.shown(value)
         return found
+
+
+def _columns_in(width: int) -> int:
+    return max(width - NAME - RANGE - 1, 1)
 
 
 def _plot(name: str, values: list[float | None], floor: float, lines: int) -> list[tuple[str, str]]:

@@ -241,7 +241,7 @@ class WatchApp(App[int]):
     def action_scroll(self, screens: float) -> None:
         with self.feed.lock:
             if self.feed.history.samples:
-                self._view.scroll(screens * self.size.width, self.feed.history)
+                self._view.scroll(screens, self.feed.history, self.size.width)
         self.redraw()
 
     def action_zoom(self, factor: float) -> None:

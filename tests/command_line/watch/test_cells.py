@@ -110,14 +110,17 @@ def test_plots_of_joints_scroll_back_and_follow_again(walked_history: History) -
     history.samples = deque(Sample(time_s=each / 10, body_x_m=None, **signals) for each in range(1000))
     view = View(period_s=0.1)
     assert view.text(history, 80, 20).plain.count("▁") == 4 * 56
-    view.scroll(-100, history)
-    assert view.end_s == pytest.approx(79.9)
+    view.scroll(-0.5, history, 80)
+    assert view.end_s == pytest.approx(94.3)
     view.zoom(2.0)
     assert "▁" * 56 in view.text(history, 80, 20).plain
     view.signal = 1  # the current is unknown
     assert "▁" not in view.text(history, 80, 20).plain
-    view.scroll(1e9, history)
+    view.scroll(1e9, history, 80)
     assert view.end_s is None
+    view.signal = 0
+    view.scroll(-1e9, history, 80)  # to the first sample, at the left end
+    assert view.text(history, 80, 20).plain.count("▁") == 4 * 56
 
 
 @pytest.mark.parametrize("roomy", [False, True])
