@@ -14,7 +14,7 @@ NO_DAEMON = (
     "Without a robot, 'mudskipper simulate' makes one."
 )
 EXTRA_OF = {  # by module
-    "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
+    "matplotlib": "plots", "scipy": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
     "distributed": "cluster", "evdev": "inputs", "zenoh": "ros2", "rosbags": "ros2",
 }  # fmt: skip
 PACKAGES = {"PIL": "pillow", "evdev": "evdev-binary", "zenoh": "eclipse-zenoh"}  # whose name is not that of the module

@@ -64,17 +64,18 @@ def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> No
         ("log", "export", "--parquet", log): "data",
         ("log", "query", "select 1", "."): "data",
         ("experiment", "trackway", "--simulated"): "plots",
+        ("experiment", "loadcell", "--simulated"): "plots",
         ("ros2",): "ros2",
         ("log", "list", "."): "",
     }
     program = (
-        "sys.modules.update(dict.fromkeys(('matplotlib', 'pyarrow', 'duckdb', 'zenoh')))\n"
+        "sys.modules.update(dict.fromkeys(('matplotlib', 'scipy', 'pyarrow', 'duckdb', 'zenoh')))\n"
         f"print([main(command) for command in {[*needed]}])"
     )
     found = ended(program, folder)
     statuses = [exit_codes.UNHEALTHY if extra else exit_codes.OK for extra in needed.values()]
     assert "walk.mcap" in found.stdout and found.stdout.splitlines()[-1] == str(statuses)
-    assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data", "ros2")] == [4, 2, 1]
+    assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data", "ros2")] == [5, 2, 1]
     assert "Traceback" not in found.stderr
 
 
