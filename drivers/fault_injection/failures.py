@@ -7,7 +7,7 @@ the `failing_*` classes ask `Failures` what fails and change what passes through
 `update`, and random draws come from a seed, so a failure in lockstep is reproducible to the last bit.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from random import Random
@@ -46,8 +46,8 @@ def end_text(failure: Failure) -> str:
 class Failures:
     """Owns the active failures by component. A healthy tick only checks that `failing` is empty."""
 
-    def __init__(self, buses: Iterable[str], seed: int = 1) -> None:
-        self.families = _families(buses)  # of every component
+    def __init__(self, buses: Iterable[str], seed: int = 1, joints: Sequence[str] = JOINTS) -> None:
+        self.families = _families(buses, joints)  # of every component
         self._seed = seed
         self.reset()
 
@@ -110,8 +110,8 @@ class Failures:
         return self.now_s + self.random.uniform(LEAST_DELAY_S, MOST_DELAY_S)
 
 
-def _families(buses: Iterable[str]) -> dict[str, str]:
-    named = {"JOINT": JOINTS, "NAME": tuple(buses)}
+def _families(buses: Iterable[str], joints: Sequence[str]) -> dict[str, str]:
+    named = {"JOINT": joints, "NAME": tuple(buses)}
     families: dict[str, str] = {}
     for family in EFFECTS:
         placeholder = next((each for each in named if each in family), "")

@@ -23,7 +23,8 @@ Report = Callable[[float, str], None]
 
 def failures_of(configuration: Configuration) -> Failures | None:
     """Make the failures, or return None if the configuration does not allow any."""
-    return Failures(configuration.bus) if configuration.failures.allowed else None
+    rig = configuration.rig
+    return Failures(configuration.bus, joints=rig.joints) if configuration.failures.allowed else None
 
 
 def with_failures(

@@ -16,6 +16,7 @@ from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import Level
 from firmware_host.sockets.status_socket import Methods
+from verification.example_robot import load_one_flipper
 
 MIA = Caller(1, Peer(7, 1000, frozenset()), Level.DRIVE)
 
@@ -139,6 +140,12 @@ def test_only_the_configuration_s_switch_allows_it(configuration: Configuration,
     assert failures_of(configuration) is None
     allowed = failures_of(parse_configuration(example_text + "\n[failures]\nallowed = true\n"))
     assert allowed is not None and "bus.left" in allowed.families
+
+
+def test_a_robot_of_one_flipper_has_no_other_that_could_fail() -> None:
+    allowed = failures_of(replace(load_one_flipper(), failures=FailureParameters(True)))
+    assert allowed is not None
+    assert not allowed.refusal("right_sweep", "off") and "no component" in (allowed.refusal("left_sweep", "off") or "")
 
 
 def test_without_the_switch_there_is_no_wrapper_at_all(configuration: Configuration) -> None:
