@@ -86,6 +86,7 @@ def test_an_upgrade_and_the_way_back_keep_the_configuration(packaged: Robot) -> 
 def test_a_removal_keeps_configuration_and_logs_and_a_purge_does_not(packaged: Robot) -> None:
     packaged.shell("systemctl stop simulated-robot; dpkg --remove mudskipper", 120.0)
     packaged.shell(f"test -e {CONFIGURATION} -a -d /var/lib/mudskipper -a ! -e /opt/mudskipper/venv")
-    packaged.shell("! systemctl cat mudskipper && ! test -e /usr/local/bin/mudskipper")
+    packaged.shell("! systemctl is-enabled mudskipper && ! systemctl cat mudskipper-live")  # the first one is edited
+    packaged.shell("! test -e /usr/local/bin/mudskipper")
     packaged.shell("dpkg --purge mudskipper")
     packaged.shell("! test -e /etc/mudskipper && ! test -e /var/lib/mudskipper && ! getent passwd mudskipper")

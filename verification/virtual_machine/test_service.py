@@ -69,4 +69,4 @@ def test_the_journal_can_be_read(booted: Robot) -> None:
     text = booted.shell("journalctl --boot --unit=mudskipper --no-pager --output=cat")
     assert re.search(r"^Started mudskipper.service - Mudskipper robot controller\.$", text, re.MULTILINE)
     assert "Traceback" not in text
-    assert "warning" not in text
+    assert "warning" not in text.replace("warning: protection is weakened (a virtual machine", "")
