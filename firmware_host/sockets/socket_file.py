@@ -5,7 +5,7 @@ it may do (rights.py), not the file: an existing folder keeps its permissions, a
 operators' own file admits their group alone.
 
 Symbolic links are not followed, and only a dead socket is removed: never a file, a link, or the socket of a daemon that
-lives or hangs. A folder that every user may write to is refused, since any user could replace the socket there.
+lives or hangs. A folder in which any user could replace the socket is refused: one that all may write to, not sticky.
 """
 
 import errno
