@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from math import isfinite
 from typing import Any
 
 from firmware_host.trial import BEGUN, METADATA_KEY, OperatorReport, Trial, from_json, read_report
@@ -15,6 +16,7 @@ def log_summary(log: AnyLog) -> dict[str, Any]:
     """At rest the log has fewer rows than ticks ran."""
     ends = log.ends
     duration_s = float(ends["stamp_s"][-1] - ends["stamp_s"][0]) if len(ends) else 0.0
+    duration_s = duration_s if isfinite(duration_s) else 0.0
     ticks = _ticks_run(ends)
     return {
         "robot": log.metadata.get("robot", ""),

@@ -1,5 +1,6 @@
 """Whole, cut and damaged logs are read as far as possible, or refused with one sentence."""
 
+import json
 import random
 import struct
 from pathlib import Path
@@ -98,6 +99,15 @@ def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
     assert (len(log.ticks), log.complete, log.configuration_text) == (0, True, "[robot]\n")
     summary = log_summary(log)
     assert (summary["started"], summary["rows"], summary["ticks"], summary["rate_hz"]) == ("", 0, 0, None)
+
+
+def test_a_log_without_stamps_has_a_summary_that_is_json(tmp_path: Path) -> None:
+    log = LogFile(tmp_path / "stampless.mcap", OPENING)
+    log.write([(TICK_KIND, encode_row(TICK, stamp_s=np.nan, tick=number)) for number in range(2)])
+    log.finish()
+    summary = log_summary(read_log(log.path))
+    assert (summary["duration_s"], summary["rate_hz"], summary["ticks"]) == (0.0, None, 2)
+    json.dumps(summary, allow_nan=False)
 
 
 def test_an_unfinished_log_is_read_up_to_its_cut(path: Path, whole: Log, tmp_path: Path) -> None:
