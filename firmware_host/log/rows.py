@@ -119,7 +119,7 @@ def tick_row(
         *temperatures_c,
         *voltages_v,
         *supply_currents_a,
-        tick.number,
+        tick.number & 0xFFFFFFFF,  # from 0 again after 130 days: a larger one would end the loop
         missed_ticks,
         target.stride,
         mode,

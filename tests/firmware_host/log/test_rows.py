@@ -36,7 +36,7 @@ def test_a_tick() -> None:
     ]
     row = tick_row(
         tick_kind(RIG),
-        Tick(now_s=30.0, late_s=0.5, number=7, missed=1),
+        Tick(now_s=30.0, late_s=0.5, number=(1 << 32) + 7, missed=1),  # after 130 days
         0.25,
         states=Joints(*states),
         sent=LimitedTorques(torques_nm=Joints(3.0, 4.0), limited=True, finite=True),
