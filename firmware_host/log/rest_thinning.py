@@ -43,7 +43,7 @@ class RestThinning:
         notice = ""
         for row in rows:
             if row[0] == TICK_KIND and len(row[1]) > self._mode_at:
-                notice = self._add_tick(row, written) or notice
+                notice = "; ".join(filter(None, (notice, self._add_tick(row, written))))
             else:
                 written.append(row)
         return Thinned(written, notice)

@@ -50,6 +50,11 @@ def test_a_change_of_mode_without_torque_ends_a_rest(thinning: RestThinning) -> 
     assert set(range(1000, 1100)) <= set(numbers(rows)) and len(rows) > 400
 
 
+def test_a_rest_that_begins_and_ends_in_one_batch_has_both_notices(thinning: RestThinning) -> None:
+    notice = thinning.thin([*make_ticks(0, 1000, Mode.IDLE), *make_ticks(1000, 1001, Mode.ARMING)]).notice
+    assert [part.partition(":")[0] for part in notice.split("; ")] == ["at rest", "end of the rest"]
+
+
 def test_what_is_held_back_comes_out_at_the_end(thinning: RestThinning) -> None:
     written = numbers(thinning.thin(make_ticks(0, 600, Mode.IDLE)).rows) + numbers(thinning.release())
     assert sorted(written) == list(range(600))
