@@ -64,12 +64,12 @@ def load_configuration(path: Path) -> Configuration:
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
-    """Read a text. Raises ConfigurationError with all problems; one about its syntax names the file."""
+    """Read a text. Raises ConfigurationError as `read_configuration`; one about its syntax names the file."""
     return read_configuration(parse_document(text, file), text)
 
 
 def read_configuration(document: dict[str, Any], text: str = "") -> Configuration:
-    """Read the tables of a file, and change them. Raises ConfigurationError with all problems."""
+    """Read the tables of a file, and change them. Raises ConfigurationError with all problems of one step."""
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
     _require_known_types(document)
