@@ -3,7 +3,7 @@
 Every file of a run carries the run's id, its own number, the configuration, version and host, and the offset of both
 clocks, measured again for each file, so each can be read alone. A row goes into exactly one file. When the disk refuses
 (full, read-only, removed), the file is cut back to its safe rows and left for recovery, rows are counted instead of
-written, and a new file is tried every few seconds; its first event reports the number of missing rows.
+written, and a new file is tried every few seconds; its first events report deleted logs and the number of missing rows.
 """
 
 import errno
