@@ -17,12 +17,14 @@ from experiments.robot.lockstep_robot import simulated_configuration, start_walk
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
+from firmware_host.mud_learning import STORED_STRIDES
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import Track
 
 LAWS = {"k_p": STROKE_LAW, "k_s": SHEAR_LAW, "k_e": STROKE_LAW}
 STRIDE_S = 3.0  # at most, without a recovery
+MOST_STRIDES = STORED_STRIDES // 2  # the loop stores no more of both flippers
 NO_LAW = {"exponent": float("nan"), "std_error": float("nan")}
 
 
@@ -31,7 +33,7 @@ def study(
     *,
     depth: Annotated[tuple[float, ...], Option("of insertion, in turn", low=1, high=5, unit="cm")] = (2.0, 3.0, 4.0),
     strength: Annotated[tuple[float, ...], Option("of a mud", low=100, high=5e4, unit="Pa")] = (800.0, 1600.0, 3600.0),
-    strides: Annotated[int, Option("of a walk", low=4, high=200)] = 12,
+    strides: Annotated[int, Option("of a walk", low=4, high=MOST_STRIDES)] = 12,
     seeds: Annotated[int, Option("walks in each mud", low=1, high=100)] = 3,
 ) -> Result:
     """How the coefficients change with depth, and whether mud does that."""
