@@ -15,7 +15,7 @@ from experiments.trials.load_cell_truth import FlipperTruths
 from experiments.trials.trial import Trial, replay_trial
 from simulation.body.reference_sensor import StrideTruth
 
-FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
+FOLLOWED = 0.2  # of the truth: two thirds of the smallest step between the muds
 
 
 def transitions_of(trial: Trial, truths: FlipperTruths) -> list[dict[str, Any]]:
