@@ -226,8 +226,8 @@ def _key(location: tuple[str | int, ...], document: Any) -> str:
             document = document[part]
             name = document.get("name") if isinstance(document, dict) else None
             key += f" {part + 1}" + (f" ({name})" if isinstance(name, str) else "")
-        elif not part.startswith("<"):  # the tag of one of several records
-            document = document.get(part) if isinstance(document, Mapping) else None
+        elif isinstance(document, Mapping) and not part.startswith("<"):  # no tag of one of several records or types
+            document = document.get(part)
             key += f".{part}" if key else part
     return key
 

@@ -51,6 +51,9 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("torque_nm = 0.75", "torqe_nm = 0.5", ["limits.torqe_nm: there is no such key"]),
     ("torque_nm = 0.75", "torque_nm = 9.5", ["limits.torque_nm = 9.5: must be at most 5.0"]),
     ("torque_nm = 0.75", "torque_nm = nan", ["limits.torque_nm = "]),
+    ("[bus.left]", "[bus.left]\noptions = { a = [1] }", [
+        f"bus.left.options.a = [1]: should be a valid {kind}" for kind in ("string", "integer", "number", "boolean")
+    ]),
     ("torque_nm = 0.75", "torque_nm = 0.75\nsweep_max_deg = 25.0", [
         "limits.sweep_max_deg = 25.0: must be at least 30"
     ]),
