@@ -83,6 +83,7 @@ class FailureCalls:
         refused = self._failures.refusal(component, kind, for_s)
         if refused:
             raise RefusedError(refused)
+        self.end(component)  # of the one that this failure replaces
         now_s = self._clock()
         self._report(now_s, begin_text(component, kind, for_s, str(caller)))  # first: it may be the log that fails
         self._failures.begin(component, kind, now_s, for_s)

@@ -95,6 +95,12 @@ def test_one_or_all_failures_can_be_ended_and_each_end_is_reported(bench: Bench)
     ]
 
 
+def test_the_end_of_a_failure_that_another_one_replaces_is_reported(bench: Bench) -> None:
+    bench.fail("log", "off")
+    bench.fail("log", "stuck")
+    assert bench.reported[1][1:] == ("end of failing on purpose: log off", False)
+
+
 def test_a_disarm_ends_every_failure_before_it_is_done(bench: Bench) -> None:
     bench.fail("left_sweep.command", "off")
     assert bench.methods["disarm"]({}, MIA) == "accepted"
