@@ -67,7 +67,7 @@ class StatusClient:
         size = CREDENTIALS.size
         return int(CREDENTIALS.unpack(self._socket.getsockopt(SOL_SOCKET, SO_PEERCRED, size))[0])
 
-    def call(self, method: str, **params: Any) -> Any:
+    def call(self, method: str, /, **params: Any) -> Any:
         """Return the result of a method.
 
         Raises CallRefusedError or NotPermittedError with the daemon's message, or NoDaemonError if no answer comes.

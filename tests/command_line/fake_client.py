@@ -19,7 +19,7 @@ class FakeClient(StatusClient):
         self.answer = answer
         self.calls: list[str] = []
 
-    def call(self, method: str, **params: Any) -> Any:
+    def call(self, method: str, /, **params: Any) -> Any:
         self.calls.append(f"{method} {params.get('depth_m', '')}".strip())
         answer = self.answer(method)
         if isinstance(answer, Exception):

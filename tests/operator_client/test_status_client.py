@@ -41,6 +41,15 @@ def answer(ends: Ends, *messages: Any) -> Any:
     return client.call("status")
 
 
+def test_a_parameter_may_have_any_name(ends: Ends) -> None:
+    """The keys of a trial are an operator's own, such as the method that a walk compares."""
+    client, connection = ends
+    connection.sendall(msgpack.packb([rpc.RESPONSE, 1, None, "set"]))
+    params = {"method": "adaptive", "self": "1"}
+    assert client.call("trial_set", **params) == "set"
+    assert msgpack.unpackb(connection.recv(4096))[2:] == ["trial_set", params]
+
+
 def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
     """An answer stays unread if Ctrl-C interrupts its request."""
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"

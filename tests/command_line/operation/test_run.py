@@ -24,7 +24,7 @@ class WalkOfTwoStrides(StatusClient):
         self.orders: list[dict[str, Any]] = []
         self._refusal, self._asked, self._stopped = refusal, 0, False
 
-    def call(self, method: str, **params: Any) -> Any:
+    def call(self, method: str, /, **params: Any) -> Any:
         if method == "status":
             self._asked += 1
             rests = self._stopped or self._asked > 8
@@ -46,7 +46,7 @@ class WalkOfTwoStrides(StatusClient):
 class HoldingRobot(WalkOfTwoStrides):
     """A daemon whose robot holds its pose until its seventh status, and refuses angles beyond 1 rad."""
 
-    def call(self, method: str, **params: Any) -> Any:
+    def call(self, method: str, /, **params: Any) -> Any:
         if method == "status":
             self._asked += 1
             return MODE | {"mode": "hold" if self._asked < 7 else "idle", "now_s": 0.1 * self._asked}
@@ -103,7 +103,7 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
         ("raise SystemExit(0)", ("SystemExit", "line 3")),
         ("return __import__('json').loads('')", ("JSONDecodeError", "line 3")),
         ("return 'deep'", ("'deep'",)),
-        ("return {'depth_m': 0.03, 'method': 'disarm'}", ("'method'",)),
+        ("return {'depth_m': 0.03, 4: 'disarm'}", ("4: 'disarm'",)),
     ],
 )
 def test_a_law_that_fails_stops_the_robot_and_is_named(
