@@ -88,18 +88,25 @@ class StrokeSums:
         if snapshot.depth_m <= 0.0:
             return
         self._deepest_m = max(self._deepest_m, snapshot.depth_m)
-        speed_m_s = snapshot.speed_m_s
-        self._moved_m += dt_s * speed_m_s
+        self._moved_m += dt_s * snapshot.speed_m_s
         if self.phase is Phase.STANCE:
-            forward_m_s = snapshot.forward_m_s
-            speed_m_s = -forward_m_s if forward_m_s < -SLIPPING_M_S else 0.0
-            self._slip_m += dt_s * speed_m_s
-            if self._to_yield_m > 0.0:
-                self._to_yield_m = min(self._to_yield_m + dt_s * forward_m_s, SIDEWAYS_YIELD_M)
-                if self._to_yield_m <= 0.0:
-                    self._begin_means()
-            elif not speed_m_s:
-                return
+            self._shear(dt_s, snapshot)
+        else:
+            self._add(dt_s, snapshot, snapshot.speed_m_s)
+
+    def _shear(self, dt_s: float, snapshot: FlipperSnapshot) -> None:
+        """Add a tick of a stance; once the mud yields, only one with slip."""
+        forward_m_s, had_yielded = snapshot.forward_m_s, self._to_yield_m <= 0.0
+        speed_m_s = -forward_m_s if forward_m_s < -SLIPPING_M_S else 0.0
+        self._slip_m += dt_s * speed_m_s
+        if not had_yielded:
+            self._to_yield_m = min(self._to_yield_m + dt_s * forward_m_s, SIDEWAYS_YIELD_M)
+            if self._to_yield_m <= 0.0:
+                self._begin_means()
+        if speed_m_s or not had_yielded:
+            self._add(dt_s, snapshot, speed_m_s)
+
+    def _add(self, dt_s: float, snapshot: FlipperSnapshot, speed_m_s: float) -> None:
         self._ticks += 1
         self._sweep += snapshot.sweep_rad
         self._adduction += snapshot.adduction_rad
