@@ -3,7 +3,8 @@
 Each walk has its own mud, drawn between soft and firm with random strength along the track, the disturbances of the
 authors' logs or none, direct motors or belts with play, a body that is free or on rails, and adaptive or fixed depths.
 The robot walks, holds, moves joints and walks on, in lockstep. A flipper that the mud holds is no false alarm: those
-faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers. A free body in
+faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers, where the plant's
+true load on the flipper says so. A free body in
 mud of more than 3 kPa may walk for a minute and stay where it is: full torque, 11.5 N of thrust, does not drag its
 belly.
 """
@@ -41,6 +42,7 @@ DEPTHS_M = (0.02, 0.025, 0.03, 0.035)
 PLAY_DEG = 1.0  # of belts between motors and joints
 GAINS_WITH_PLAY = JointGains(4.0, 0.033, 4.0, 0.033)  # 8 degrees of phase margin for a rotor alone, or more
 MOVE_RAD = 0.2
+HELD_FRACTION = 0.5  # of the torque limit, of the mud's torque on a joint: 0.9 in the walks that were held so far
 BY_THE_MUD, BY_SINKING = ("flipper_stuck", "joint_not_following"), "following_error"
 
 
@@ -85,16 +87,19 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     robot = FailingRobot(configuration, track, seed, plant=plant, drives=drives)
     order = WalkOrder(chance.choice(DEPTHS_M), chance.random() < 0.7)
     robot.arm()
+    of_mud = (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD
     faults, strides, stride = [], 0, -1
     while robot.now_s < WALK_S and robot.loop.mode in (Mode.HOLD, Mode.WALKING, Mode.STOPPING):
         _operate(robot, chance, order)
         robot.step()
         faults += [
-            (robot.now_s, fault.name) for fault in robot.loop.faults.begun if fault.kind.reaction > Reaction.WARN
+            (robot.now_s, fault.name, fault.name in of_mud and is_held(robot, fault.subject))
+            for fault in robot.loop.faults.begun
+            if fault.kind.reaction > Reaction.WARN
         ]
         before, stride = stride, robot.loop.controller.target.stride  # each walk counts from 0
         strides += stride > before
-    held, alarms = counted_apart(faults, (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD)
+    held, alarms = counted_apart(faults)
     return {
         "duration_s": robot.now_s,
         "play_deg": disturbances.play_deg,
@@ -105,11 +110,21 @@ def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     }
 
 
-def counted_apart(faults: Sequence[tuple[float, str]], of_mud: Sequence[str]) -> tuple[list[str], list[str]]:
+def counted_apart(faults: Sequence[tuple[float, str, bool]]) -> tuple[list[str], list[str]]:
     """Return the faults of the mud, and the false alarms. What comes with a fault of the mud or later may follow it."""
-    held_s = min((now_s for now_s, name in faults if name in of_mud), default=inf)
-    held = [f"{now_s:.2f} s: {name}" for now_s, name in faults if name in of_mud]
-    return held, [f"{now_s:.2f} s: {name}" for now_s, name in faults if now_s < held_s]
+    held_s = min((now_s for now_s, _, of_mud in faults if of_mud), default=inf)
+    held = [f"{now_s:.2f} s: {name}" for now_s, name, of_mud in faults if of_mud]
+    return held, [f"{now_s:.2f} s: {name}" for now_s, name, _ in faults if now_s < held_s]
+
+
+def is_held(robot: FailingRobot, subject: str) -> bool:
+    """Return whether the mud holds the flipper that is, or whose joint is, the subject of a fault."""
+    configuration = robot.loop.configuration
+    return any(
+        max(abs(arm.force.sweep_nm), abs(arm.force.adduction_nm)) >= HELD_FRACTION * configuration.limits.torque_nm
+        for flipper, arm in zip(configuration.rig.flippers, robot.robot.plant.arms, strict=True)
+        if subject.startswith(flipper)
+    )
 
 
 def _operate(robot: FailingRobot, chance: Random, order: WalkOrder) -> None:

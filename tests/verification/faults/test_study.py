@@ -6,6 +6,7 @@ from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,8 +20,10 @@ from drivers.fault_injection.failure_table import PHASES
 from experiments.study.result import Result
 from experiments.study.session import Ending
 from experiments.study.trials import Trials
+from simulation.mud.flipper_contact import NO_CONTACT
 from verification.faults.evaluation import Cell
 from verification.faults.failing_robot import FailingRobot
+from verification.faults.phases import real_configuration
 from verification.studies import healthy_walks
 from verification.studies.faults import FAULTS, study
 
@@ -132,6 +135,27 @@ def test_the_strides_of_all_walks_of_a_minute_count(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_false_alarm_before_the_mud_holds_a_flipper_counts() -> None:
-    faults = [(1.0, "current_stale"), (2.0, "flipper_stuck"), (2.5, "current_silent")]
-    held, alarms = healthy_walks.counted_apart(faults, healthy_walks.BY_THE_MUD)
+    faults = [(1.0, "current_stale", False), (2.0, "flipper_stuck", True), (2.5, "current_silent", False)]
+    held, alarms = healthy_walks.counted_apart(faults)
     assert (held, alarms) == (["2.00 s: flipper_stuck"], ["1.00 s: current_stale"])
+
+
+@pytest.mark.parametrize(
+    ("subject", "left", "right", "held"),
+    [
+        ("left", (0.0, 0.0), (0.7, 0.0), False),  # a monitor that names the wrong flipper gives a false alarm
+        ("left_sweep", (-0.375, 0.0), (0.0, 0.0), True),
+        ("right_adduction", (0.0, 0.0), (0.0, 0.375), True),
+        ("right", (0.7, 0.7), (0.374, -0.374), False),
+    ],
+)
+def test_only_a_flipper_that_the_mud_loads_is_held_by_it(
+    subject: str, left: tuple[float, float], right: tuple[float, float], held: bool
+) -> None:
+    arms = [
+        SimpleNamespace(force=NO_CONTACT._replace(sweep_nm=sweep_nm, adduction_nm=adduction_nm))
+        for sweep_nm, adduction_nm in (left, right)
+    ]
+    loop = SimpleNamespace(configuration=real_configuration("odrive"))
+    robot: Any = SimpleNamespace(loop=loop, robot=SimpleNamespace(plant=SimpleNamespace(arms=arms)))
+    assert healthy_walks.is_held(robot, subject) is held
