@@ -7,7 +7,6 @@ and more is a claim that is too small. A second table compares the plate as the 
 upright plate of the paper's load cell.
 """
 
-from math import isnan
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ def _errors(group: DataFrame) -> Row:
     """Return the errors of one method for one coefficient in one mud. None where there is no such estimate."""
     values, bounds = group[group["kind"] == "value"], group[group["kind"] == "bound"]
     ratios = values["value"] / values["truth"]
-    margins = NORMAL_95 * values["std_error"]
+    margins, truths = NORMAL_95 * values["std_error"], group["truth"].dropna()
     bounds_hold = bounds["value"] - NORMAL_95 * bounds["std_error"] <= bounds["truth"]
     return {
         "median": _statistic(np.median, abs(ratios - 1.0)),
@@ -51,7 +50,7 @@ def _errors(group: DataFrame) -> Row:
         "bounds_hold": _statistic(np.mean, bounds_hold),  # fraction of bounds below the truth, within their errors
         "bound_over_truth": _statistic(np.median, bounds["value"] / bounds["truth"]),
         "not_valid": len(group) - len(values) - len(bounds),
-        "truth_n_m3": None if isnan(truth := float(group["truth"].median())) else round(truth),
+        "truth_n_m3": round(float(np.median(truths))) if len(truths) else None,
     }
 
 

@@ -64,7 +64,7 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _wires(configuration: Configuration) -> dict[str, str]:
-    """Return what tells the channel of each bus from others: two sections may share one."""
+    """Return what identifies the channel of each bus, which two sections may have in common."""
     return {
         name: f"{bus.interface} {bus.channel} {shown(sorted(bus.options.items()))}"
         for name, bus in configuration.bus.items()

@@ -117,7 +117,8 @@ def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud:
         yield f"{where}: must be from {low_deg:g} to {high_deg:g} degrees, limits.sweep_min_deg and sweep_max_deg"
     if not geometry.is_reachable(sweep_rad, depth_m):
         deepest_m = geometry.deepest_m(sweep_deg)
-        deepest_cm, highest_m = floor(1e4 * deepest_m) / 100.0, -deepest_m - 2.0 * geometry.axis_height_m
+        highest_m = -deepest_m - 2.0 * geometry.axis_height_m  # as far above the axis as the deepest is below it
+        deepest_cm = floor(1e4 * deepest_m) / 100.0
         yield f"{where}: out of reach, must be from {ceil(1e4 * highest_m) / 100.0:g} to {deepest_cm:g} cm"
         return
     if depth_m > configuration.adaptation.max_depth_m + ROUNDING_M:  # a way-point in metres, or half an ellipse

@@ -76,19 +76,19 @@ class StrokeSums:
         self.reset()
 
     def reset(self) -> None:
-        self._deepest_m, self._slip_m, self._moved_m = -inf, 0.0, 0.0
+        self._deepest_m, self._slip_m, self._path_m = -inf, 0.0, 0.0
         self._to_yield_m = SIDEWAYS_YIELD_M
         self._begin_means()
 
     def _begin_means(self) -> None:
         self._ticks = 0
-        self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._path_m = 0.0
+        self._sweep = self._adduction = self._depths_m = self._speed_m2_s = self._counted_m = 0.0
 
     def update(self, dt_s: float, snapshot: FlipperSnapshot) -> None:
         if snapshot.depth_m <= 0.0:
             return
         self._deepest_m = max(self._deepest_m, snapshot.depth_m)
-        self._moved_m += dt_s * snapshot.speed_m_s
+        self._path_m += dt_s * snapshot.speed_m_s
         if self.phase is Phase.STANCE:
             self._shear(dt_s, snapshot)
         else:
@@ -112,7 +112,7 @@ class StrokeSums:
         self._adduction += snapshot.adduction_rad
         self._depths_m += snapshot.depth_m
         self._speed_m2_s += dt_s * speed_m_s * speed_m_s
-        self._path_m += dt_s * speed_m_s
+        self._counted_m += dt_s * speed_m_s
 
     def truth(self) -> StrokeTruth:
         if not self._ticks:
@@ -121,10 +121,10 @@ class StrokeSums:
             self._sweep / self._ticks,
             self._adduction / self._ticks,
             self._deepest_m,
-            self._speed_m2_s / self._path_m if self._path_m > 0.0 else UNKNOWN,
+            self._speed_m2_s / self._counted_m if self._counted_m > 0.0 else UNKNOWN,
             self._slip_m if self.phase is Phase.STANCE else UNKNOWN,
             self._depths_m / self._ticks,
-            self._moved_m,
+            self._path_m,
         )
 
 

@@ -100,13 +100,13 @@ MIT: Table = {
     "arming_failed": LEFT_AT_ONCE,
     "joint_not_following": _instead(HELD_FAST, "encoder_stuck"),
     "following_error": _instead(HELD_FAST, "encoder_stuck"),
-    **{
-        f"encoder_slips, at {rate} rad/s": _instead(
-            "the loop holds the angle at one code while the joint creeps, as an encoder does that is stuck",
+    **dict.fromkeys(
+        ("encoder_slips, at +0.05 rad/s", "encoder_slips, at -0.05 rad/s"),
+        _instead(
+            "the loop holds the angle at one code while the joint creeps, as of an encoder that is stuck",
             "encoder_stuck",
-        )
-        for rate in ("+0.05", "-0.05")
-    },
+        ),
+    ),
 }
 NO_REGISTERS = "MIT mode reads no register of this motor"
 NO_VOLTAGE = "no answer states the supply's voltage; below a limit of its own the drive reports an error"

@@ -4,9 +4,8 @@ Each walk has its own mud, drawn between soft and firm with random strength alon
 authors' logs or none, direct motors or belts with play, a body that is free or on rails, and adaptive or fixed depths.
 The robot walks, holds, moves joints and walks on, in lockstep. A flipper that the mud holds is no false alarm: those
 faults are counted apart, as is a free body that sinks until the mud blocks the swing of its flippers, where the plant's
-true load on the flipper says so. A free body in
-mud of more than 3 kPa may walk for a minute and stay where it is: full torque, 11.5 N of thrust, does not drag its
-belly.
+true load on the flipper says so. A free body in mud of more than 3 kPa may walk for a minute and stay where it is: full
+torque, 11.5 N of thrust, does not drag its belly.
 """
 
 from collections import Counter
@@ -120,11 +119,8 @@ def counted_apart(faults: Sequence[tuple[float, str, bool]]) -> tuple[list[str],
 def is_held(robot: FailingRobot, subject: str) -> bool:
     """Return whether the mud holds the flipper that is, or whose joint is, the subject of a fault."""
     configuration = robot.loop.configuration
-    return any(
-        max(abs(arm.force.sweep_nm), abs(arm.force.adduction_nm)) >= HELD_FRACTION * configuration.limits.torque_nm
-        for flipper, arm in zip(configuration.rig.flippers, robot.robot.plant.arms, strict=True)
-        if subject.startswith(flipper)
-    )
+    force = robot.robot.plant.arms[configuration.rig.flippers.index(subject.partition("_")[0])].force
+    return max(abs(force.sweep_nm), abs(force.adduction_nm)) >= HELD_FRACTION * configuration.limits.torque_nm
 
 
 def _operate(robot: FailingRobot, chance: Random, order: WalkOrder) -> None:
