@@ -73,9 +73,13 @@ def _stiffness(
     cell: LoadCell | JointCell = JointCell(stride.ground, geometry, stroke.sweep_rad, stride.surface_m, relaxation)
     if upright:
         cell = LoadCell(stride.ground, geometry, 0.0, 0.0, relaxation)
-    down, up = measure_stroke(cell, stroke.deepest_m, stroke.speed_m_s, hold_s, stride.stance.path_m)
-    fitted_m = stroke.deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * stroke.deepest_m
-    rows = [row for row in (down if sign > 0.0 else up) if 0.0 < row[0] <= fitted_m]
+    deepest_m, speed_m_s = stroke.deepest_m, stroke.speed_m_s
+    if sign > 0.0:
+        curve = cell.lower(deepest_m, speed_m_s)
+    else:
+        _, curve = measure_stroke(cell, deepest_m, speed_m_s, hold_s, stride.stance.path_m)
+        deepest_m *= 1.0 - REVERSAL_FRACTION
+    rows = [row for row in curve if 0.0 < row[0] <= deepest_m]
     square = fsum(law * law for _, law, _ in rows)
     return fsum(law * sign * load for _, law, load in rows) / square if square > 0.0 else None
 
