@@ -22,6 +22,7 @@ from firmware_host.log.log_folder import (
     ENDING,
     PART,
     PRESERVED,
+    age_of,
     free_space,
     log_files,
     stored_files,
@@ -46,7 +47,7 @@ def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED
     folder = chosen_folder(folder, config)
     entries = catalogued(folder)
     paths = {*stored_files(folder), *log_files(folder, PRESERVED), *entries}
-    logs = [describe(path, entries.get(path)) for path in sorted(paths, key=lambda path: path.name)]
+    logs = [describe(path, entries.get(path)) for path in sorted(paths, key=age_of)]
     space = free_space(folder)
     report = {
         "folder": str(folder),

@@ -63,10 +63,10 @@ def present_path(path: Path) -> Path:
 def log_files(folder: Path, *subfolders: str) -> list[Path]:
     """Return the logs in these subfolders, the oldest first; a missing subfolder is empty."""
     found = [path for subfolder in subfolders for path in (folder / subfolder).glob(f"*{ENDING}")]
-    return sorted(found, key=_age)
+    return sorted(found, key=age_of)
 
 
-def _age(path: Path) -> tuple[str, int, str]:
+def age_of(path: Path) -> tuple[str, int, str]:
     """Return what sorts logs by time: after segment 9999 the names alone do not."""
     own = SEGMENT.fullmatch(path.stem)
     return (own["run"], int(own["number"]), path.name) if own else (path.stem, 0, path.name)

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import duckdb
 
-from firmware_host.log.log_folder import ACTIVE, DONE, ENDING, PRESERVED
+from firmware_host.log.log_folder import ACTIVE, DONE, ENDING, PRESERVED, age_of
 from logs.catalogue.entry import (
     COLUMNS,
     TRIALS,
@@ -66,9 +66,7 @@ def catalogue_path(folder: Path) -> Path:
 
 def closed_logs(folder: Path) -> list[Path]:
     """Return all logs below the folder whose writer is done, oldest first."""
-    return sorted(
-        (path for path in folder.rglob(f"*{ENDING}") if path.parent.name != ACTIVE), key=lambda path: path.name
-    )
+    return sorted((path for path in folder.rglob(f"*{ENDING}") if path.parent.name != ACTIVE), key=age_of)
 
 
 class Catalogue:
@@ -204,7 +202,7 @@ def _without_copies(present: Iterable[tuple[Path, FileStamp]]) -> list[tuple[Pat
     found: dict[tuple[str, int], tuple[Path, FileStamp]] = {}
     for path, stamp in sorted(present, key=lambda each: (len(each[0].parts), each[0])):
         found.setdefault((stamp.name, stamp.bytes), (path, stamp))
-    return sorted(found.values(), key=lambda each: each[0].name)
+    return sorted(found.values(), key=lambda each: age_of(each[0]))
 
 
 def _mark_copies(entries: Iterable[LogEntry]) -> list[LogEntry]:

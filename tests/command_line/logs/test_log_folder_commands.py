@@ -9,6 +9,7 @@ import pytest
 from command_line import exit_codes
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
+from logs.catalogue.catalogue import closed_logs
 from logs.files.log_reader import read_log
 from tests.command_line.command_lines import failure, json_of, output, run
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
@@ -60,6 +61,15 @@ def test_incomplete_logs_are_listed_and_counted(folder: Path) -> None:
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file() and path.suffix != ".parquet"]
     assert report["logs_bytes"] == sum(sizes) and 0 < report["free_bytes"] < report["disk_bytes"]
     assert "broken: damaged" in output("log", "list", str(folder))
+
+
+def test_logs_are_listed_in_the_order_of_their_segments(tmp_path: Path) -> None:
+    names = ["run-9999.mcap", "run-10000.mcap", "runs-0000.mcap"]
+    (tmp_path / DONE).mkdir()
+    for name in reversed(names):
+        (tmp_path / DONE / name).write_bytes(b"no log")
+    assert [log["name"] for log in json_of("log", "list", str(tmp_path))["logs"]] == names
+    assert [path.name for path in closed_logs(tmp_path)] == names
 
 
 def test_recovery_of_a_folder_skips_logs_that_are_being_written(folder: Path) -> None:

@@ -235,5 +235,6 @@ def test_a_router_that_comes_later_is_waited_for(monkeypatch: pytest.MonkeyPatch
     assert len(said) == 1 and address in said[0]
 
 
-def test_a_malformed_address_is_one_sentence() -> None:
-    assert "--router nonsense" in failure("ros2", "--router", "nonsense", status=exit_codes.USAGE)
+@pytest.mark.parametrize("address", ["nonsense", "tpc/localhost:7447"])
+def test_a_malformed_address_is_one_sentence(address: str) -> None:
+    assert f"--router {address}" in failure("ros2", "--router", address, status=exit_codes.USAGE)
