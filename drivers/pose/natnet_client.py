@@ -3,8 +3,9 @@
 A multicast server sends its frames to a group that this client joins on one interface. A unicast server sends them to
 each client that has asked to connect and keeps sending requests. The server reports which version of the protocol it
 speaks; the configuration states it where requests do not reach the server. Nothing here waits: `receive` itself sends
-requests once a second, until they are answered. It runs in the bridge's process (natnet_bridge.py), where a malformed
-or a large packet cannot delay the loop.
+requests once a second, and asks to connect again where no position arrives: a server that was started later, or again,
+may speak another version. It runs in the bridge's process (natnet_bridge.py), where a malformed or a large packet
+cannot delay the loop.
 
 A position is stamped with the time of its exposure as far as it is known. From version 3.0 on, frames contain the time
 from the exposure to the sending, and the least recent delay gives the difference of the clocks (pose_timing.py). The
@@ -57,7 +58,7 @@ class NatNetClient:
         configured = parse_version(parameters.version)
         self._layout = FrameLayout(configured) if configured else None
         self._version = configured
-        self._ticks_per_s = 0
+        self._ticks_per_s: int | None = None  # until the server has answered
         self._identity = parameters.body_id
         self._id_known = not parameters.body
         self._models_changed = False
@@ -74,8 +75,8 @@ class NatNetClient:
         self._now_s = now_s
         if self.parameters.server and now_s - self._asked_s >= REQUEST_S:
             self._asked_s = now_s
-            silent = now_s - self._heard_s > REQUEST_S
-            self.sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
+            unanswered = self._ticks_per_s is None or now_s - self._seen_s > REQUEST_S
+            self.sockets.request(CONNECT if unanswered else KEEP_ALIVE)
             if self.parameters.body and (self._models_changed or not self._id_known):
                 self._models_changed = False
                 self.sockets.request(REQUEST_MODEL)

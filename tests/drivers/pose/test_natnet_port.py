@@ -155,6 +155,38 @@ def test_multicast_frames_are_heard_on_an_interface(open_laboratory: Open, inter
     assert len(known(lab.run(0.5))) > 100
 
 
+def open_multicast(open_laboratory: Open, poses: Sequence[RecordedPose], version: str, **serving: Any) -> Laboratory:
+    """Open a laboratory whose server sends to a group from the start, and answers requests as well."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind((LOOPBACK, 0))
+        number = free.getsockname()[1]
+    listening = {"group": GROUP, "port": number, "interface": "lo", "version": version}
+    return open_laboratory(poses, listening, target=(GROUP, number), **serving)
+
+
+def test_a_multicast_server_that_restarts_with_another_version_is_understood(open_laboratory: Open) -> None:
+    """Its frames are heard before it can be asked, and cannot be decoded."""
+    lab = open_multicast(open_laboratory, [*moving(1.0), *moving(4.0, 4.0)], "", crowded=True)
+    assert known(lab.run(1.0))
+    lab.server.answers = False
+    lab.run(4.0)
+    lab.server.answers, lab.server.version = True, NatNetVersion(3, 0)
+    assert known(lab.run(7.0))
+    assert lab.port.report().source.startswith("NatNet 3.0")
+
+
+def test_a_server_that_starts_later_is_asked_for_its_clock_though_the_version_is_configured(
+    open_laboratory: Open,
+) -> None:
+    lab = open_multicast(open_laboratory, moving(5.0, 2.0), "4.1", latency_s=0.03)
+    lab.server.answers = False
+    lab.run(2.02)
+    lab.server.answers = True
+    now_s, body = known(lab.run(6.0))[-1]
+    assert body.x_m == pytest.approx(SPEED_M_S * now_s, abs=3e-4)
+    assert now_s - body.stamp_s >= 0.03
+
+
 def test_frames_wait_until_their_version_is_known(open_laboratory: Open) -> None:
     unanswered = open_laboratory(moving(4.0))
     unanswered.server.answers = False
