@@ -5,7 +5,7 @@ questions come from a second drive with the same id. Times are those of the read
 read, and a later one has the answers.
 """
 
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from control.records import NEVER_S
@@ -27,18 +27,18 @@ class AnsweringAxis(DriveAxis):
         super().reset()
         self._following = False  # commanded by this program
         self._unanswered = self._surplus = 0
-        self._question_s = self._surplus_s = NEVER_S  # when the oldest unanswered question was asked
+        self._question_s = inf  # when the first question since the last answer was asked
+        self._surplus_s = NEVER_S
         self.settings.reset()
 
     def _on_question(self) -> None:
-        if not self._unanswered:
-            self._question_s = self._read_s
+        self._question_s = min(self._question_s, self._read_s)
         self._unanswered = min(self._unanswered + 1, MOST_UNANSWERED)
 
     def _on_answer(self) -> None:
         """Count an answer, before its signals are stored."""
         silent_s = self._read_before_s - self._question_s
-        self._question_s = self._read_s
+        self._question_s = inf
         if self._unanswered:
             self._unanswered -= 1
         else:

@@ -5,7 +5,7 @@ from math import isnan
 import pytest
 
 from tests.drivers.bench.simulated_bus import simulated
-from tests.simulation.devices.driven_drives import TYPES, DrivenDrives
+from tests.simulation.devices.driven_drives import TICK_S, TYPES, DrivenDrives
 
 each_type = pytest.mark.parametrize("name", TYPES)
 
@@ -18,6 +18,20 @@ def test_a_pause_of_this_program_is_no_restart_and_no_second_drive(name: str) ->
         drives.wait(2.0)
     drives.tick(count=400)
     assert [(axis.health.restarts, axis.health.duplicate_id) for axis in drives.drives.axes] == [(0, False)] * 4
+
+
+@each_type
+def test_a_moment_without_questions_is_no_restart_though_earlier_ones_were_lost(name: str) -> None:
+    """The bench lets watchdogs expire so: it goes on reading."""
+    drives = DrivenDrives(name)
+    drives.drives.poll()
+    drives.far.receive()  # no drive has power yet
+    drives.tick(count=400)
+    for _ in range(200):
+        drives.wait(TICK_S)
+        drives.drives.read(drives.now_s)
+    drives.tick(count=10)
+    assert [axis.health.restarts for axis in drives.drives.axes] == [0] * 4
 
 
 @each_type
