@@ -6,9 +6,12 @@ storing makes it last. A type of drive that can do neither says so in `cannot`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from math import inf
+from struct import Struct
 from typing import Any, NamedTuple
 
 from drivers.bench.bench_port import BenchPort
+from drivers.can.frames import MalformedMessageError
 
 WATCHDOG_S = 0.1  # the time-out that is wanted, where the configuration allows it
 SAME_FRACTION = 1e-4  # of a number that a drive keeps as binary32, or prints with six digits
@@ -27,7 +30,7 @@ class FoundDrive(NamedTuple):
 
 
 class CannotReadError(Exception):
-    """This setting cannot be read over CAN as things are; the message says why, and what helps."""
+    """This setting cannot be read or written over CAN as things are; the message says why, and what helps."""
 
 
 class Setting(NamedTuple):
@@ -64,10 +67,18 @@ def watchdog(key: str, longest_s: float) -> Setting:
 
 
 def same(value: float, expected: float) -> bool:
-    """Return whether a drive has taken a value; NaN is a value, of a watchdog that is off."""
+    """Return whether a drive has taken a value; NaN is one, of a watchdog that is off, and so is infinity, no limit."""
     if expected != expected:
         return value != value
-    return abs(value - expected) <= SAME_FRACTION * abs(expected)
+    return value == expected or abs(value - expected) <= SAME_FRACTION * abs(expected) < inf
+
+
+def encoded(layout: Struct, key: str, value: float) -> bytes:
+    """Encode a number by its type; raises CannotReadError for one that the type does not have."""
+    try:
+        return layout.pack(value if layout.format == "<f" else round(value))
+    except (MalformedMessageError, OverflowError, ValueError):
+        raise CannotReadError(f"{key} cannot be {value:g}") from None
 
 
 class DriveSetup(ABC):

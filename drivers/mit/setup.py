@@ -9,7 +9,7 @@ on. Source: damiao-motor 1.0.6 (REGISTER_TABLE and store_parameters of core/moto
 from collections.abc import Mapping, Sequence
 
 from drivers.bench.bench_port import NoAnswerError
-from drivers.bench.drive_setup import WATCHDOG_S, AskedSetup, FoundDrive, Setting, exactly
+from drivers.bench.drive_setup import WATCHDOG_S, AskedSetup, FoundDrive, Setting, encoded, exactly
 from drivers.can.frames import Frame
 from drivers.mit import codec
 from drivers.mit.models import MODELS
@@ -135,7 +135,7 @@ class DamiaoSetup(AskedSetup):
 
     def write(self, key: str, value: float) -> None:
         register = NAMES[key]
-        data = FLOAT.pack(value) if register in FLOATS else WORD.pack(round(value))
+        data = encoded(FLOAT if register in FLOATS else WORD, key, value)
         self._ask(codec.WRITE, register, data, f"the writing of {key}")
 
     def save(self) -> None:

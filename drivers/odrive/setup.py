@@ -12,7 +12,7 @@ from struct import Struct, error
 from typing import Any, NamedTuple
 
 from drivers.bench.bench_port import BenchPort, NoAnswerError
-from drivers.bench.drive_setup import AskedSetup, CannotReadError, FoundDrive, Setting, exactly, watchdog
+from drivers.bench.drive_setup import AskedSetup, CannotReadError, FoundDrive, Setting, encoded, exactly, watchdog
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive import codec
@@ -153,7 +153,7 @@ class OdriveSetup(AskedSetup):
     def write(self, key: str, value: float) -> None:
         """Write; firmware from 0.6.11 on confirms it, older ones do not, so the value is read back."""
         number = self._number(key)
-        data = number.layout.pack(value if number.layout.format == "<f" else round(value))
+        data = encoded(number.layout, key, value)
         head = codec.RX_SDO.encode(SDO_WRITE, number.endpoint, 0)
         self._port.send(Frame(arbitration_id(self._parameters.node_id, codec.RX_SDO), head + data))
         self._port.listen(0.01)

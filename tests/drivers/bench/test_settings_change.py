@@ -1,6 +1,6 @@
 """Wherever the writing of settings is interrupted, the drive ends with all the old or all the new ones, as reported."""
 
-from math import inf, isnan
+from math import inf, isnan, nan
 from typing import Any
 
 import pytest
@@ -99,6 +99,36 @@ def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
         assert bench.state() == "old"
         bench.switch_off_and_on()
         assert bench.state() == "old"
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value"),
+    [
+        ("odrive", "axis0.config.can.encoder_msg_rate_ms", -1.0),
+        ("odrive", "axis0.config.can.encoder_msg_rate_ms", nan),
+        ("odrive", "axis0.controller.config.vel_limit", 1e40),
+        ("mit", "TIMEOUT", inf),
+        ("mit", "PMAX", 1e40),
+    ],
+)
+def test_a_number_that_the_drive_cannot_hold_leaves_the_old_settings(name: str, key: str, value: float) -> None:
+    """A file to restore may say anything; the settings before that number have been written then."""
+    bench = Bench(name)
+    bench.new |= {key: value}
+    bench.old = {each: bench.first[each] for each in bench.new}
+    change = bench.change()
+    assert (change.outcome, bench.state()) == (Outcome.OLD, "old")
+    assert f"{key} cannot be {value:g}" in change.text
+
+
+def test_a_limit_of_infinity_is_a_setting_that_can_be_restored() -> None:
+    bench = Bench("odrive")
+    limit = "axis0.controller.config.vel_limit"
+    bench.new, bench.old = {limit: inf}, {limit: bench.first[limit]}
+    assert bench.state() == "old" and not same(1e30, inf)
+    assert bench.change().outcome is Outcome.NEW
+    bench.switch_off_and_on()
+    assert bench.drive.read(limit) == inf
 
 
 @each_type
