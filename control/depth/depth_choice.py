@@ -156,8 +156,12 @@ class DepthAdaptation:
         return any(stride.step_m > self.geometry.flipper_length_m / 2.0 for stride in strides)
 
     def _deeper(self, walked_m: float) -> DepthChoice:
-        """Return the next stride where the mud was too soft to be felt: it would stay so at the same depth."""
-        gait = self.choice.gait or self.gait
+        """Return the next stride where the mud was too soft to be felt: it would stay so at the same depth.
+
+        A gait that is no candidate, as the first stride's may be, gives way to the narrowest.
+        """
+        gaits = [each.gait for each in self.candidates]
+        gait = self.choice.gait if self.choice.gait in gaits else gaits[0]
         same_gait = [each for each in self.candidates if each.gait == gait]
         deeper = (each for each in same_gait if each.depth_m >= DEEPER * walked_m)
         return self._choice_of(next(deeper, same_gait[-1]), False, "nothing known of the thrust, deeper")

@@ -144,6 +144,17 @@ def test_the_first_stride_is_walked_as_configured() -> None:
     assert adaptation.choice.gait == GAIT
 
 
+@pytest.mark.parametrize("walked_deg", [20.0, 30.0, 50.0])
+def test_mud_too_soft_to_be_felt_in_the_first_stride_is_tried_deeper_with_the_narrowest_sweep(
+    walked_deg: float,
+) -> None:
+    """The first stride's gait is the configured one, which is no candidate: its swing is slower."""
+    adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=walked_deg))
+    adaptation.reset(0.02)
+    choice = choose_now(adaptation, NOTHING_KNOWN, strides())
+    assert (choice.depth_m, sweep_deg(choice)) == (pytest.approx(0.025), PARAMETERS.gait.min_sweep_deg)
+
+
 def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() -> None:
     adaptation, before_deg, widest_deg = adapted(), 30.0, 0.0
     for _ in range(6):
