@@ -17,7 +17,7 @@ from math import hypot, inf, isfinite
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work
-from control.controller import Controller, WalkOrder
+from control.controller import Controller
 from control.depth.depth_choice import Adaptation, DepthAdaptation, DepthChoice
 from control.depth.gait_choice import GaitAdaptation
 from control.depth.paper_choice import PaperAdaptation
@@ -123,8 +123,7 @@ class MudLearning:
         """Begin to close the strides that the last sample ended; end an insertion that has met solid mud."""
         closing, self._closing = self._closing, None
         if closing is not None:
-            work = self._close(closing, controller, controller.order, controller.gait.commanded_depth_m)
-            self.estimator.work.add(work)
+            self.estimator.work.add(self._close(closing, controller, controller.gait.commanded_depth_m))
         conditions = controller.gait.conditions
         if conditions is not None:
             if self._lasts(self._meets(conditions)) and controller.gait.end_phase():
@@ -156,14 +155,12 @@ class MudLearning:
         self._closed, self._messages = [], []
         return report
 
-    def _close(
-        self, closing: Work[tuple[StrideEstimate, ...]], controller: Controller, order: WalkOrder, walked_m: float
-    ) -> Work[None]:
+    def _close(self, closing: Work[tuple[StrideEstimate, ...]], controller: Controller, walked_m: float) -> Work[None]:
         """Estimate the strides that end, choose the depth of the next one, and publish both."""
         strides = yield from closing
         yield
         messages = ["another mud"] if self.estimator.mud_estimate.boundary else []
-        messages += yield from self._choose(controller, order, self.estimator.felt_strides, walked_m)
+        messages += yield from self._choose(controller, self.estimator.felt_strides, walked_m)
         self._messages += messages
         depth_m, first = controller.gait.next_depth_m, self.strides_closed
         lowest_v, self._lowest_v = self._lowest_v, [inf] * len(self._lowest_v)
@@ -176,16 +173,16 @@ class MudLearning:
         self.strides_closed += len(closed)
         self.strides = (self.strides + closed)[-STORED_STRIDES:]
 
-    def _choose(
-        self, controller: Controller, order: WalkOrder, strides: Sequence[StrideEstimate], walked_m: float
-    ) -> Work[list[str]]:
+    def _choose(self, controller: Controller, strides: Sequence[StrideEstimate], walked_m: float) -> Work[list[str]]:
         """Choose the depth of the next stride, and its gait if the method chooses that too; return messages."""
-        gait = controller.gait
-        if not order.adaptive:
+        gait, choice = controller.gait, None
+        if controller.order.adaptive:
+            choice = yield from self.adaptation.choose(self.estimator.mud_estimate, strides, walked_m)
+        order = controller.order  # an operator may have fixed the strides since the choice began
+        if choice is None or not order.adaptive:
             gait.next_depth_m = order.depth_of(gait.stride + 1)  # that of a late choice is one later
             self.depth_reason = "in turn" if order.depths_m else "fixed"
             return []
-        choice = yield from self.adaptation.choose(self.estimator.mud_estimate, strides, walked_m)
         parameters = choice.gait or gait.parameters
         self.depth_reason = _reason_text(choice)
         if (choice.depth_m, parameters) == (gait.next_depth_m, gait.next_parameters):

@@ -319,7 +319,7 @@ METHODS: dict[str, SocketMethod] = {
     ),
     "depth": SocketMethod(
         Level.DRIVE,
-        "Fix the depth of the present walk, from the next stride on, or from the second if that one is being chosen.",
+        "Fix the depth of the present walk, from the next stride on.",
         (FIXED_DEPTH, *LEASE),
     ),
     "stride": SocketMethod(

@@ -46,6 +46,9 @@ class FakeGait:
     conditions: None = None
     ended: int = 0
 
+    def is_choice_due(self, within_s: float, may_turn: bool) -> bool:
+        return False
+
     def end_phase(self) -> bool:
         self.ended += 1
         return self.ended == 1
@@ -93,6 +96,23 @@ def test_a_fixed_depth_does_not_depend_on_the_mud(learning: MudLearning) -> None
     controller = FakeController(WalkOrder(0.045, adaptive=False))
     step(learning, controller, stride(k_p=Estimate(1e9, 1.0, 100, True)))
     assert controller.gait.next_depth_m == 0.045
+
+
+@pytest.mark.parametrize("begun", [WalkOrder(0.03), WalkOrder(0.03, adaptive=False, depths_m=(0.03, 0.04))])
+def test_strides_that_an_operator_fixes_while_the_next_one_is_chosen_stay_fixed(
+    learning: MudLearning, begun: WalkOrder
+) -> None:
+    """The choice takes some 30 ticks; it had put back the depth and, for the rest of the walk, the gait."""
+    controller, slow = FakeController(begun), replace(GaitParameters(), stance_speed_m_s=0.25)
+    learning.finish()
+    learning._closing, learning.estimator.felt_strides = finished((stride(),)), (stride(),)
+    learning.adapt(controller)  # type: ignore[arg-type]
+    learning.step(controller, 0.0)  # type: ignore[arg-type]
+    controller.order = WalkOrder(0.02, adaptive=False)
+    controller.gait.next_depth_m, controller.gait.next_parameters = 0.02, slow
+    (closed,), _ = learning.finish()
+    assert (controller.gait.next_depth_m, controller.gait.next_parameters) == (0.02, slow)
+    assert (closed.chosen_depth_m, learning.depth_reason) == (0.02, "fixed")
 
 
 def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLearning) -> None:
