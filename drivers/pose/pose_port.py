@@ -2,7 +2,7 @@
 
 Sources are motion capture, a rail encoder or `PosePort`: a Unix datagram socket that receives 16-byte messages from a
 bridge on the same machine, two little-endian doubles: the source's own time and the position x in metres. The newest
-message wins; its stamp is the time when it was read.
+message wins; its stamp is the time when it was read. After a jump one read has no pose.
 """
 
 import contextlib
@@ -14,6 +14,7 @@ from struct import Struct
 from typing import NamedTuple, Protocol
 
 from control.records import NEVER_S, BodyPose
+from drivers.pose.pose_timing import JUMP_M
 
 POSE = Struct("<dd")
 STALE_S = 0.05  # six frames of 120 Hz; a frozen position would turn a lower bound on k_s into a value
@@ -90,7 +91,7 @@ class PosePort:
         self._pose = BodyPose()
 
     def read(self, now_s: float) -> BodyPose:
-        self._now_s = now_s
+        self._now_s, jumped = now_s, False
         for _ in range(MOST_MESSAGES_PER_READ):
             try:
                 data = self._socket.recv(64)
@@ -98,11 +99,12 @@ class PosePort:
                 break
             x_m = POSE.unpack(data)[1] if len(data) == POSE.size else float("nan")
             if isfinite(x_m):
+                jumped = jumped or abs(x_m - self._pose.x_m) > JUMP_M  # never true of the first, after NaN
                 self._pose = BodyPose(now_s, x_m)
                 self.poses += 1
             else:
                 self.malformed_messages += 1
-        return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
+        return self._pose if now_s - self._pose.stamp_s <= STALE_S and not jumped else BodyPose()
 
     def report(self) -> PoseReport:
         report = PoseReport(f"socket {self._path}", self.poses, self.malformed_messages)

@@ -1,6 +1,7 @@
 """The body's position from an encoder on its rail: a serial port on which a counter sends one count per line.
 
-encoder_counts.py decodes the lines and rejects implausible counts; serial_line.py opens and reads the port. An
+encoder_counts.py decodes the lines and rejects implausible counts; serial_line.py opens and reads the port. Where the
+counts begin anew, one read has no pose: the body has not moved so far, and no stroke must count it as motion. An
 unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
@@ -59,14 +60,15 @@ class RailEncoder:
         return self._counts.malformed
 
     def read(self, now_s: float) -> BodyPose:
-        self._now_s, was_there = now_s, self.line.is_there
+        self._now_s, was_there, jumps = now_s, self.line.is_there, self._counts.jumps
         for line in self.line.read(now_s):
             x_m = self._counts.accept(line, now_s)
             if x_m is not None:
                 self._pose = BodyPose(now_s, x_m)
         if was_there and not self.line.is_there:
             self.reset()
-        return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
+        is_known = now_s - self._pose.stamp_s <= STALE_S and self._counts.jumps == jumps
+        return self._pose if is_known else BodyPose()
 
     def reopen(self, now_s: float) -> bool:
         """Try to open a lost device again, every RETRY_S; return whether it did."""

@@ -3,6 +3,7 @@
 import socket
 import struct
 from collections.abc import Iterator
+from math import isnan
 from pathlib import Path
 
 import pytest
@@ -37,8 +38,15 @@ def send_bytes(path: Path, data: bytes) -> None:
 
 def test_the_newest_pose_wins_and_is_stamped_when_it_is_read(port: PosePort, sender: PoseSender) -> None:
     sender.send(100.0, 0.1)
-    sender.send(100.1, 0.2)
-    assert port.read(7.0) == (7.0, 0.2)
+    sender.send(100.1, 0.12)
+    assert port.read(7.0) == (7.0, 0.12)
+
+
+def test_a_jump_leaves_a_read_without_a_pose(port: PosePort, sender: PoseSender) -> None:
+    """Strokes would count it as motion of the body."""
+    for source_s, x_m in enumerate((0.1, 0.6, 0.61)):
+        sender.send(source_s, x_m)
+        assert isnan(port.read(1.0 + 0.01 * source_s).x_m) == (x_m == 0.6)
 
 
 def test_a_pose_has_these_bytes(port: PosePort, path: Path) -> None:
@@ -77,8 +85,8 @@ def test_a_sender_without_a_listener_does_not_raise(path: Path) -> None:
 
 def test_a_sender_whose_listener_does_not_read_does_not_wait(port: PosePort, sender: PoseSender) -> None:
     for number in range(1000):
-        sender.send(0.0, float(number))
-    assert 0.0 <= port.read(1.0).x_m < 999.0  # the first few: a full socket drops what comes after
+        sender.send(0.0, 1e-6 * number)
+    assert 0.0 <= port.read(1.0).x_m < 999e-6  # the first few: a full socket drops what comes after
 
 
 def test_a_socket_left_by_a_killed_process_is_replaced(path: Path) -> None:

@@ -67,6 +67,14 @@ def test_counts_become_metres_and_a_malformed_line_is_counted_and_changes_nothin
     assert rail.encoder.report()[1:] == (3, 1, 0, "", "")
 
 
+def test_a_counter_that_begins_anew_leaves_a_read_without_a_pose(rail: Rail) -> None:
+    """Strokes would count the jump as motion of the body."""
+    rail.send(0.3)
+    rail.send(0.0)  # may be a garbled line
+    assert isnan(rail.send(0.0))
+    assert rail.send(0.001) == pytest.approx(0.001)
+
+
 def test_a_count_ends_when_it_is_stale(rail: Rail) -> None:
     rail.send(0.1)
     assert rail.encoder.read(rail.now_s + 0.9 * STALE_S).x_m == pytest.approx(0.1)
