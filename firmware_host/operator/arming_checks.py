@@ -92,7 +92,7 @@ def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
     if missing:
         other = f"; {health.other_protocol} answers under its id: {OTHER_TYPE}" if health.other_protocol else ""
         return {f"drive.{joint}": f"not heard: no {', '.join(missing)} yet{other}"}
-    unwatched = not isfinite(state.temperature_stamp_s)
+    unwatched = not isfinite(state.temperature_c)  # never arrived, or the drive has no sensor and says so by NaN
     heat = f", {state.temperature_c:.0f} degrees C" if isfinite(state.temperature_c) else ""
     lines = {
         f"drive.{joint}": f"heard, firmware {health.firmware or 'unknown'}{UNWATCHED if unwatched else ''}",

@@ -1,5 +1,7 @@
 """The list of `mudskipper check` fails in exactly the lines whose faults block arming."""
 
+from math import nan
+from struct import pack
 from typing import Any
 
 import pytest
@@ -107,14 +109,17 @@ def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configura
     assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
 
 
+@pytest.mark.parametrize("sent", [None, nan], ids=["never sent", "sent as no number"])
 def test_a_drive_without_temperature_is_reported_but_does_not_block_arming(
-    configuration: Configuration,
+    configuration: Configuration, sent: float | None
 ) -> None:
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
     for drive in robot.robot.drives:
         everything = drive.cyclic_frames
         drive.cyclic_frames = lambda now_s, everything=everything: (  # type: ignore[method-assign, misc]
-            frame for frame in everything(now_s) if frame.arbitration_id & 0x1F != 0x15
+            frame if frame.arbitration_id & 0x1F != 0x15 else frame._replace(data=pack("<ff", 30.0, sent))
+            for frame in everything(now_s)
+            if sent is not None or frame.arbitration_id & 0x1F != 0x15
         )
     robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.blocking(), 3.0)
     items = {item["id"]: item for item in arming_checks(robot.loop, [])}
