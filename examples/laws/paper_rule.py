@@ -2,13 +2,11 @@
 
 mudskipper run examples/laws/paper_rule.py
 
-The suction of a plate at depth z is k_e times the moment of its area below the surface. For a plate that stands upright
-in the mud that is about w z² l / 2 around the adduction axis, with the width w and the arm l.
+The mud holds a plate back with k_e times its volume below the surface. For a plate of width w and thickness t that
+stands upright at depth z, that is k_e w t z, and around the adduction axis, with the arm l, k_e w t z l.
 """
 
-from math import sqrt
-
-WIDTH_M, ARM_M = 0.03, 0.12
+WIDTH_M, THICKNESS_M, ARM_M = 0.025, 0.004, 0.12
 MOTOR_NM = 0.5  # of the motors' torque limit, what an extraction may take
 SHALLOWEST_M, DEEPEST_M = 0.015, 0.045
 
@@ -18,5 +16,5 @@ def law(strides):
     known = [stride["k_e"]["value"] for stride in strides if stride["k_e"]["valid"]]
     if not known:
         return None
-    depth_m = sqrt(2.0 * MOTOR_NM / (max(known) * WIDTH_M * ARM_M))
+    depth_m = MOTOR_NM / (max(known) * WIDTH_M * THICKNESS_M * ARM_M)
     return max(SHALLOWEST_M, min(depth_m, DEEPEST_M))

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.operation import attended_walk, run
+from control.geometry import FlipperGeometry
+from control.plate_integrals import submerged_part
 from operator_client.status_client import CallRefusedError, StatusClient
 from tests.folders import ROOT
 
@@ -183,3 +186,12 @@ def test_the_examples_order_depths_that_the_robot_reaches(path: Path, monkeypatc
         stride = {"k_e": {"value": k_e, "valid": True}, "step_m": step_m}
         order = run.order_of(example, [stride, stride])
         assert order is not None and 0.01 <= order["depth_m"] <= 0.05
+
+
+def test_the_paper_s_rule_orders_the_depth_of_which_the_estimator_s_law_expects_its_torque() -> None:
+    """A plate that stands upright in the mud."""
+    rule, geometry = run_path(str(LAWS / "paper_rule.py")), FlipperGeometry()
+    for k_e in (1e6, 1.5e6, 2.5e6):
+        depth_m = rule["law"]([{"k_e": {"value": k_e, "valid": True}}])
+        volume_m3 = geometry.plate_thickness_m * submerged_part(geometry, depth_m, 0.0, 1.0).area_m2
+        assert k_e * volume_m3 * geometry.flipper_length_m == pytest.approx(rule["MOTOR_NM"])
