@@ -119,9 +119,13 @@ class Catalogue:
         Returns the number of logs that are still to be read. Raises OSError where the table cannot be stored. An
         interruption costs no log that was read before.
         """
-        before = self.entries()
-        known = {stamp_of_entry(entry): entry for entry in before if entry.state == "whole" or not broken_again}
-        present = _without_copies(_stamped(closed_logs(self._folder)))
+        before, present = self.entries(), _without_copies(_stamped(closed_logs(self._folder)))
+        originals = {f"of {self._name_of(path)}" for path, _ in present}
+        known = {
+            stamp_of_entry(entry): entry
+            for entry in before
+            if entry.state == "whole" or not (broken_again or entry.state == "copy" and entry.reason not in originals)
+        }
         new = [(path, stamp) for path, stamp in present if stamp not in known]
         deadline_s, read = time.monotonic() + longest_s, 0
         try:

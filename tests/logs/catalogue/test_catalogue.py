@@ -101,6 +101,10 @@ def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
     assert states["done/run-0000.mcap"] == ("whole", False) and states["report/same.mcap"] == ("copy", True)
     updated(folder)
     assert len(readings) == 4  # nothing is read again
+    path.unlink()
+    (folder / "report" / "run-0000.mcap").unlink()
+    entry = updated(folder)["report/same.mcap"]  # the only one now
+    assert (entry.state, entry.run) == ("whole", "other") and entry.duration_s is not None
 
 
 def test_a_broken_log_is_an_entry_with_its_reason(folder: Path) -> None:
