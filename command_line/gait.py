@@ -85,7 +85,9 @@ def simulate(
     seed: Seed = 1,
 ) -> int:
     """Walk a gait in simulated mud, as fast as it computes; print the advance of each stride, what stuck and faults."""
-    lockstep = Lockstep(_configuration(config), Track([(TRACK_M, MUDS[mud])]), seed, disturbances=TRACKWAY)
+    configuration, track = _configuration(config), Track([(TRACK_M, MUDS[mud])])
+    fixed_base = configuration.estimation.fixed_base
+    lockstep = Lockstep(configuration, track, seed, disturbances=TRACKWAY, fixed_base=fixed_base)
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
@@ -101,7 +103,7 @@ def simulate(
     print(table([("stride", "cm", "s", "cm/s", "attempts to free a flipper"), *map(_cells, walked)]))
     advance_m, duration_s = sum(each["m"] for each in walked), sum(each["s"] for each in walked)
     if walked:  # else a fault came before the first stride
-        print(f"\n{100.0 * advance_m:.1f} cm in {duration_s:.1f} s, {100.0 * advance_m / duration_s:.2f} cm/s")
+        print(f"\n{100.0 * advance_m:z.1f} cm in {duration_s:.1f} s, {100.0 * advance_m / duration_s:z.2f} cm/s")
     if fault := loop.fault:
         complain(fault.message)
     return exit_codes.UNHEALTHY if fault else exit_codes.OK

@@ -63,3 +63,10 @@ def test_a_gait_is_simulated_for_a_robot_that_is_not_calibrated_yet(tmp_path: Pa
     robot = str(tmp_path / "robot.toml")
     assert run("init", robot, "--defaults", "--flippers", "right", "--drive", "mit").returncode == exit_codes.OK
     assert run("gait", "simulate", "walking", "--strides", "1", "--config", robot).returncode == exit_codes.OK
+
+
+def test_a_robot_on_a_fixed_base_does_not_advance(tmp_path: Path) -> None:
+    robot = str(tmp_path / "robot.toml")
+    assert run("init", robot, "--defaults", "--base", "fixed").returncode == exit_codes.OK
+    found = run("gait", "simulate", "walking", "--mud", "48.5", "--strides", "1", "--config", robot)
+    assert found.returncode == exit_codes.OK and "0.0 cm in" in found.stdout
