@@ -40,15 +40,16 @@ class Trials:
     def run(self, function: Callable[..., Entry], rows: DataFrame | Iterable[Row], **shared: Any) -> DataFrame:
         """Call `function(**row, **shared)` for each row; return parameters and measurements in the order of the rows.
 
-        The function must belong to a module, and what it returns must be a mapping that JSON can hold. `shared` is no
-        part of what a row is known by. Raises NotebookError, WorkersError, OSError.
+        A row that is given again, as by a repeated option, counts once. The function must belong to a module, and what
+        it returns must be a mapping that JSON can hold. `shared` is no part of what a row is known by. Raises
+        NotebookError, WorkersError, OSError.
         """
         ordered = rows.to_dict("records") if isinstance(rows, DataFrame) else [dict(row) for row in rows]
-        keys = [f"{function.__name__} {json.dumps(row, default=str)}" for row in ordered]
+        by_key = {f"{function.__name__} {json.dumps(row, default=str)}": row for row in ordered}
         self._notebook = notebook = self._notebook or Notebook(self.folder, self._plan)
-        left = {key: row for key, row in zip(keys, ordered, strict=True) if key not in notebook.entries}
+        left = {key: row for key, row in by_key.items() if key not in notebook.entries}
         names = list(left)
-        before = self._ended + len({*keys}) - len(left)
+        before = self._ended + len(by_key) - len(left)
         try:
             run_parallel(
                 [partial(function, **row, **shared) for row in left.values()],
@@ -57,9 +58,9 @@ class Trials:
                 keep=lambda index, entry: notebook.write(names[index], entry),
             )
         finally:
-            ended = [(key, row) for key, row in zip(keys, ordered, strict=True) if key in notebook.entries]
-            self.measured.append(DataFrame([row | notebook.entries[key] for key, row in ended]))
-        self._ended += len({*keys})
+            ended = [row | notebook.entries[key] for key, row in by_key.items() if key in notebook.entries]
+            self.measured.append(DataFrame(ended))
+        self._ended += len(by_key)
         return self.measured[-1]
 
     def compute(self, calls: Sequence[Callable[[], Result]]) -> list[Result]:

@@ -53,7 +53,9 @@ def test_one_file_is_a_command_with_its_table_page_and_numbers(
         assert (out / f"strokes.{ending}").stat().st_size > 1000
     notebook = (out / "notebook.jsonl").read_bytes()
     assert main([*COMMAND, "--depth", "2", "--depth", "5", "--out", str(out)]) == exit_codes.REFUSED  # it is finished
-    assert main([*COMMAND, "--depth", "5", "--out", str(out)]) == exit_codes.OK  # its rows are there already
+    again = [*COMMAND, "--depth", "5", "--depth", "5", "--out", str(out)]
+    assert main(again) == exit_codes.OK  # its rows are there already, and one of them counts once
+    assert list(pd.read_parquet(out / "results.parquet")["depth_cm"]) == [5.0]
     printed = capsys.readouterr().out.splitlines()
     assert printed[1].split() == ["depth_cm", "(cm)", "step_cm", "(cm)", "failed"] and printed[2].split()[0] == "5"
     assert (out / "notebook.jsonl").read_bytes() == notebook
