@@ -5,9 +5,11 @@ file that counts. The same command continues an interrupted experiment.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from itertools import count
+from pathlib import Path
 
 import numpy as np
 
@@ -47,29 +49,36 @@ FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates wi
 
 def measure_all(bench: CellBench) -> None:
     """Measure every trial that is not in the notebook."""
+    attempts = Counter[str]()
     steps = [
-        OperatorStep(trial.key, partial(bench.stage.prepare, trial, bench.plan.trials), partial(measure, bench, trial))
+        OperatorStep(
+            trial.key,
+            partial(bench.stage.prepare, trial, bench.plan.trials),
+            partial(measure, bench, trial, attempts),
+        )
         for trial in bench.plan.list_trials()
     ]
     conduct_steps(steps, bench.notebook, bench.session.operator, bench.session.show, {"skipped": True})
 
 
-def measure(bench: CellBench, trial: CellTrial) -> Entry:
-    """Measure a prepared trial, again where the operator wants it so. Return its entry for the notebook."""
-    for attempt in count(1):
-        entry, problems = record(bench, trial, attempt)
-        if not problems:
-            return entry
-        for problem in problems:
-            bench.report(f"{trial.key}: {problem}")
+def measure(bench: CellBench, trial: CellTrial, attempts: Counter[str]) -> Entry | None:
+    """Measure a prepared trial. Return its entry for the notebook; nothing where the operator wants it again."""
+    attempts[trial.key] += 1
+    attempt = attempts[trial.key]
+    entry, problems = record(bench, trial, attempt)
+    for problem in problems:
+        bench.report(f"{trial.key}: {problem}")
+    if problems:
         offered = OFFERED_OFTEN if attempt >= MOST_ATTEMPTS else OFFERED
         answer = bench.ask(f"{trial.key} may be invalid. What now?", offered)
         if answer == KEEP:
-            return entry | {"kept_in_spite_of": problems}
-        given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
-        if given_up or bench.stage.prepare(trial, bench.plan.trials) == SKIP:
-            break
-    return entry | {"skipped": True, "why": problems}
+            entry["kept_in_spite_of"] = problems
+        elif answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS):
+            entry |= {"skipped": True, "why": problems}
+        else:
+            return None
+    del attempts[trial.key]
+    return entry
 
 
 def record(bench: CellBench, trial: CellTrial, attempt: int) -> tuple[Entry, list[str]]:
@@ -87,8 +96,7 @@ def record(bench: CellBench, trial: CellTrial, attempt: int) -> tuple[Entry, lis
         stage.lower()
     stage.start(trial)
     stroke = bench.record(before.noise_n, stage.patience_s, longest_s)
-    plain_key = re.sub(r"[^\w.]+", "_", trial.key)
-    name = f"{RAW}/{plain_key}_{attempt}"
+    name = _unused_name(folder, trial)
     write_rows(folder / f"{name}.csv", FORCES, stroke.samples)
     stage.lift()
     after = bench.tare()
@@ -111,6 +119,13 @@ def record(bench: CellBench, trial: CellTrial, attempt: int) -> tuple[Entry, lis
     if remark := speed_remark(analysed, SINGLE_SPEED_BOUND):
         bench.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
     return entry, list_problems(analysed, stroke, abs(after.force_n - before.force_n))
+
+
+def _unused_name(folder: Path, trial: CellTrial) -> str:
+    """Return a name for the files of a trial, without their ending: those of earlier recordings stay."""
+    plain_key = re.sub(r"[^\w.]+", "_", trial.key)
+    names = (f"{RAW}/{plain_key}_{number}" for number in count(1))
+    return next(name for name in names if not (folder / f"{name}.csv").exists())
 
 
 def _await_encoder(bench: CellBench) -> None:

@@ -114,6 +114,24 @@ def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> No
     first, second, third, fourth = (trial.key for trial in laboratory.plan.list_trials())
     assert asked == [first, second, first, second, third, fourth]
     assert laboratory.notebook.entries[second] == {"skipped": True}
+    assert laboratory.notebook.entries[first]["file"].endswith("_2.csv")
+    assert len(list((laboratory.folder / RAW).iterdir())) == 4  # the first recording of the first trial remains
+
+
+def test_before_an_invalid_trial_is_repeated_the_one_before_can_be(make: Make) -> None:
+    laboratory = make(trials=1, amplifier=AmplifierParameters(rate_hz=10.0))  # too slow for an insertion
+    stage, asked = laboratory.cell.stage, list[str]()
+    answers = [GO_ON, GO_ON, REDO, GO_ON, SKIP]
+    prepare = stage.prepare
+
+    def answer(trial: CellTrial, trials: int) -> str:
+        asked.append(trial.kind)
+        prepare(trial, trials)
+        return answers.pop(0)
+
+    stage.prepare = answer  # type: ignore[method-assign]
+    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    assert asked == [SHEAR, INSERTION, INSERTION, SHEAR, INSERTION]
 
 
 def test_the_lines_are_examined_first(make: Make) -> None:
