@@ -19,8 +19,8 @@ in squares:
 
 RMSE and repeatability are the paper's. Its τ_sense is k_t I with the configured constant, and its RMSE that of all
 readings; here the weight of the arm itself is subtracted, which the paper does not mention. With the fitted constant
-every trial is evaluated by the constant of the other trials. Repeatability is the standard deviation over the trials of
-one weight, relative to its mean, averaged over the weights.
+every trial is evaluated by the constant of the other trials, a single one by its own. Repeatability is the standard
+deviation over the trials of one weight, relative to its mean, averaged over the weights.
 """
 
 from collections.abc import Mapping, Sequence
@@ -169,7 +169,7 @@ def fit_joint(joint: str, plan: WeighingPlan, entries: Mapping[str, Entry], conf
         "paper_rmse_nm": PAPER_RMSE_NM[joint.split("_")[1]],
         "repeatability": repeatability(loads),
     }
-    numbers |= _offset(line, loads, empty)
+    numbers |= _offset(line, loads, empty, numbers["torque_constant_error_nm_a"])
     numbers["lifted_nm"] = abs(constant_nm_a * fmean(loop.held_a for loop in loops)) if loops else nan
     return JointFit(numbers | _friction(loops, constant_nm_a, numbers["torque_constant_error_nm_a"]), loads, loops)
 
@@ -184,7 +184,7 @@ def repeatability(loads: DataFrame) -> float:
     return fmean(stdev(currents_a) / abs(fmean(currents_a)) for currents_a in repeated) if repeated else nan
 
 
-def _offset(line: FittedLine, loads: DataFrame, empty: Sequence[Entry]) -> dict[str, float]:
+def _offset(line: FittedLine, loads: DataFrame, empty: Sequence[Entry], error_nm_a: float) -> dict[str, float]:
     """Return the offset of the line, and the torque and friction of the empty arm at rest."""
     tares_a, rest_friction_a = [entry["current_a"] for entry in empty], fmean(e["rest_friction_a"] for e in empty)
     spread_a = stdev(tares_a) if len(tares_a) > 1 else nan
@@ -197,7 +197,8 @@ def _offset(line: FittedLine, loads: DataFrame, empty: Sequence[Entry]) -> dict[
         "tare_nm": fmean(tares_a),
         "tare_spread_nm": spread_a,
     }
-    return {name: current_a * line.constant_nm_a for name, current_a in currents_a.items()}
+    found = {name: current_a * line.constant_nm_a for name, current_a in currents_a.items()}
+    return found | {"tare_error_nm": hypot(tare_error_a * line.constant_nm_a, fmean(tares_a) * error_nm_a)}
 
 
 def _friction(loops: Sequence[Loop], constant_nm_a: float, error_nm_a: float) -> dict[str, float]:

@@ -30,7 +30,7 @@ FRICTION_COLUMNS = {  # values with their errors, by their keys in JSON
     "viscous": ("viscous_nm_s", "viscous_error_nm_s"),
     "at rest at least": ("rest_friction_nm",),
     "offset": ("offset_nm", "offset_error_nm"),
-    "empty arm": ("tare_nm", "tare_spread_nm"),
+    "empty arm": ("tare_nm", "tare_error_nm"),
     "swinging": ("lifted_nm",),
 }
 FRICTION_HEADING = "Friction and offset ± one standard error"
@@ -57,7 +57,7 @@ DEFINITIONS = (
     "RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as "
     "it is configured and nothing fitted; the weight of the arm is subtracted. Compare it with the paper's 0.0134 and "
     '0.0127, printed there as N/m (section III-A). "RMSE fitted" takes each trial by the constant that the other '
-    "trials gave.\n\n"
+    "trials gave, and a single trial by its own.\n\n"
     "Repeatability is the standard deviation over the trials of a weight, relative to their mean, averaged over the "
     "weights. The lightest weights make nearly all of it, as the tables by weight show."
 )

@@ -62,7 +62,7 @@ class WeightHandler:
         self.operator.ask(
             f"Mount the robot with the {axle} axle of the {flipper} flipper horizontal and the flipper out"
             " over the edge, the other joints propped within their range. Take all weights off and hold the flipper"
-            " level: all four motors will hold their angles.",
+            " level: all motors will hold their angles.",
             {GO_ON: "it is held"},
             meanwhile,
         )

@@ -54,7 +54,7 @@ Baud = Annotated[int, Option("of its port", low=300, high=4_000_000)]
 
 PAPER_PLATE_CM = (3.0, 3.5, 0.4)
 PlateSizes = Annotated[Plate, Option("or WxHxT, in cm (default: 3x3.5x0.4)", metavar="WxH", parse=parse_plate)]
-PositionStep = Annotated[float | None, Option("travel per count, of either sign", low=0.01, high=10000.0, unit="um")]
+PositionStep = Annotated[float | None, Option("travel per count", low=0.01, high=10000.0, unit="um")]
 PositionPort = Annotated[
     str | None,
     Option("port of an encoder of the stage, which may be pushed by hand then", metavar="PATH", without_value=""),
