@@ -33,6 +33,7 @@ ENDS = {
 }
 BEFORE, AGAIN = "redo the one before", "move this joint again"  # by the same key
 STILL_S, STILL_RAD = 0.3, radians(1.0)
+TURNING_RAD = 0.001  # in POLL_S: two codes of an encoder
 LEAST_TURN_RAD = radians(30.0)
 MOST_TRIES = 3
 LEVEL_DEG = 5.0  # that a check allows to a hand: 1 cm at the end of an arm
@@ -133,7 +134,10 @@ class HandSteps:
         return answer
 
     def _watch(self) -> None:
-        self._stretches.append(self._test_rig.run_for(POLL_S))
+        """Keep the samples in which a joint turns: a prompt may wait for hours."""
+        stretch = self._test_rig.run_for(POLL_S)
+        if np.ptp(signals(stretch, "angle_rad"), axis=0).max() > TURNING_RAD:
+            self._stretches.append(stretch)
 
     def _angle_at_rest(self, joint: str) -> float | None:
         """Return nothing where the joint moves."""

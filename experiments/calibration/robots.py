@@ -113,8 +113,9 @@ def build_with_errors(configuration: Configuration, seed: int) -> BuiltRobot:
     """Return a robot with one joint's sign, another's zero, and all torque constants other than configured."""
     random = Random(f"built {seed}")
     signed, shifted = random.sample(configuration.rig.joints, 2)
+    off_turn = random.choice((-1, 1)) * random.uniform(0.03, 0.1)
     changes: dict[tuple[str, ...], Any] = {
         ("drive", signed, "sign"): -configuration.drive[signed].sign,
-        ("drive", shifted, "zero_turn"): round(random.choice((-1, 1)) * random.uniform(0.03, 0.1), 3),
+        ("drive", shifted, "zero_turn"): round(configuration.drive[shifted].zero_turn + off_turn, 3),
     }
     return BuiltRobot(parse_configuration(changed_text(configuration.text, changes)))

@@ -1,5 +1,6 @@
 """Hands alone, without torque, show each error of a configuration: the robot is built otherwise than configured."""
 
+import tracemalloc
 from collections.abc import Callable, Mapping
 from math import degrees
 from pathlib import Path
@@ -12,7 +13,7 @@ from experiments.actuator.file_change import changed_text
 from experiments.actuator.simulation import BuiltRobot
 from experiments.bench.operator import Hand
 from experiments.calibration.hand_steps import HandSteps, hand_changes, level_key, stops_deg
-from experiments.calibration.robots import CalibratedRobot
+from experiments.calibration.robots import CalibratedRobot, build_with_errors
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.robot.steps import conduct_steps
@@ -75,6 +76,35 @@ def test_a_limit_beyond_a_stop_is_narrowed_to_one_degree_before_it(tmp_path: Pat
     wide = with_changes(CONFIGURATION, {("limits", "sweep_max_deg"): 110.0})
     found = hand_changes(wide, move_by_hand(tmp_path, wide, {}, "left_sweep"))
     assert found == {("limits", "sweep_max_deg"): 98.0}
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_a_robot_to_practise_on_has_its_zero_a_little_off_the_configured_one(seed: int) -> None:
+    zeros: Changes = {("drive", joint, "zero_turn"): 0.45 for joint in JOINTS}
+    configured = with_changes(CONFIGURATION, zeros)
+    built = build_with_errors(configured, seed).configuration
+    (off_turn,) = {abs(drive.zero_turn - 0.45) for drive in built.drive.values()} - {0.0}
+    assert 0.03 <= off_turn <= 0.1
+
+
+def test_a_prompt_that_waits_for_hours_takes_no_memory(tmp_path: Path) -> None:
+    session = Session(tmp_path, ScriptedOperator(), lambda done, total: None, simulated=True)
+    with CalibratedRobot(session, BuiltRobot(CONFIGURATION)).open(CONFIGURATION) as test_rig:
+        steps = HandSteps(test_rig, PatientOperator()).steps(["left_sweep"])
+        tracemalloc.start()
+        steps[0].prepare()
+        kept_bytes, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert kept_bytes < 1_000_000  # all ticks of these 5 s have 3 MB
+
+
+class PatientOperator(ScriptedOperator):
+    """Answers after five seconds."""
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        for _ in range(50):
+            meanwhile()
+        return super().ask(question, answers, meanwhile)
 
 
 class HastyOperator(ScriptedOperator):
