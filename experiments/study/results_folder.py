@@ -70,5 +70,8 @@ def remove_unused(folder: Path) -> None:
     """Remove a new folder in which nothing was measured. Logs stay, and so does their folder."""
     if not (count_entries(folder) or (folder / SUMMARY).exists()):
         with suppress(OSError):
-            (folder / NAME).unlink(missing_ok=True)
+            for notebook in [*folder.rglob(NAME)]:  # a calibration of actuators has one for each joint
+                notebook.unlink()
+                if notebook.parent != folder:
+                    notebook.parent.rmdir()
             folder.rmdir()

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from experiments.study.notebook import NAME, Notebook, NotebookError
+from experiments.study.results_folder import remove_unused
 
 PLAN = {"weights_g": (10, 20), "joint": "right_sweep"}
 
@@ -50,3 +51,15 @@ def test_where_nothing_was_measured_another_plan_may_begin(tmp_path: Path, left:
     (tmp_path / NAME).write_text(left, encoding="utf-8")
     Notebook(tmp_path, PLAN).write("10 g", {"torque_nm": 0.1})
     assert Notebook(tmp_path, PLAN).entries == {"10 g": {"torque_nm": 0.1}}
+
+
+@pytest.mark.parametrize("joint", ["", "right_sweep"])
+def test_a_new_folder_goes_again_where_nothing_was_measured_and_stays_with_a_measurement(
+    tmp_path: Path, joint: str
+) -> None:
+    empty, measured = tmp_path / "empty", tmp_path / "measured"
+    Notebook(empty / joint, PLAN)
+    Notebook(measured / joint, PLAN).write("10 g", {})
+    for folder in (empty, measured):
+        remove_unused(folder)
+    assert not empty.exists() and Notebook(measured / joint, PLAN).entries == {"10 g": {}}
