@@ -41,7 +41,7 @@ SHELL_LIMITS = "for a shell: /etc/security/limits.d"
 OLDEST_PYTHON = (3, 11)
 EARLIEST_YEAR = 2024  # a clock before that was never set
 VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # in memory, or likely so: lost at power-off
-UNSAFE = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})  # without a journal
+UNSAFE = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs"})  # without a journal; so are fuseblk, fuse.sshfs
 OURS = "mudskipper"  # name of the service, its user, its group and this distribution
 REALTIME = "realtime"
 STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
@@ -188,7 +188,7 @@ def examine_mount(mount: Mount) -> Finding:
         return fail("file_system", f"{text}, read-only", fix)
     if mount.kind in VOLATILE:
         return warn("file_system", f"{text}: logs may be gone after power-off", "set log.directory to a disk")
-    if mount.kind in UNSAFE:
+    if mount.kind in UNSAFE or mount.kind.startswith("fuse"):
         return warn("file_system", f"{text}: it may lose whole logs in a power cut", "use ext4, xfs, btrfs or f2fs")
     return ok("file_system", text)
 

@@ -19,6 +19,7 @@ TIMEX_BYTES = 256  # struct timex has 208
 CAN_INTERRUPT = re.compile(r"irq/\d+-.*(can|mcp25|spi|xhci|dwc|ehci)", re.IGNORECASE)  # SPI and USB carry adapters
 RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted after the name in brackets
 LIMIT_LINES = ("Max realtime priority", "Max locked memory")  # in /proc/PID/limits
+UNITS = " KMGTPE"  # of a limit: powers of 1024
 UNIT = "etc/systemd/system/mudskipper.service"
 
 
@@ -69,9 +70,12 @@ def unit_limits(root: Path) -> Limits | None:
 
 
 def _limit(text: str) -> float:
+    """Return a limit as /proc states it, or the soft one of a unit, such as 4G:8G."""
+    text = text.partition(":")[0]
     if text in ("unlimited", "infinity"):
         return inf
-    return float(text) if text.isdigit() else 0.0
+    number = re.fullmatch(f"([0-9]+)([{UNITS}]?)", text)
+    return float(number[1]) * 1024.0 ** UNITS.find(number[2]) if number else 0.0
 
 
 def deepest_sleep_us(root: Path) -> int:

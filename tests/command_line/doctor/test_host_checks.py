@@ -47,6 +47,7 @@ MOUNTS = """\
 tmpfs /run tmpfs rw,nosuid 0 0
 /dev/sdb1 /var/lib/my\\040logs vfat rw 0 0
 /dev/sdc1 /mnt ext4 ro,relatime 0 0
+host:/logs /net fuse.sshfs rw 0 0
 """
 
 
@@ -155,6 +156,8 @@ def test_limits_are_read_of_a_process_and_of_the_unit(computer: Path, monkeypatc
     assert [finding.level for finding in examine_limits(LoopParameters(), installed)] == [OK, OK]
     write(computer, {f"{host_facts.UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=20"})
     assert host_facts.unit_limits(computer) == Limits(20, inf, "in the unit")
+    write(computer, {f"{host_facts.UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=48:49\nLimitMEMLOCK=4G"})
+    assert host_facts.unit_limits(computer) == Limits(48, 2**32, "in the unit")
 
 
 def test_small_limits_fail_a_daemon_and_warn_of_a_shell_next_to_a_service() -> None:
@@ -173,6 +176,7 @@ def test_small_limits_fail_a_daemon_and_warn_of_a_shell_next_to_a_service() -> N
         ("/runner", Mount("/", "ext4", False), OK),
         ("/var/lib/my logs/a", Mount("/var/lib/my logs", "vfat", False), WARN),
         ("/mnt/x", Mount("/mnt", "ext4", True), FAIL),
+        ("/net/x", Mount("/net", "fuse.sshfs", False), WARN),
     ],
 )
 def test_the_file_system_of_the_logs_is_that_of_the_longest_mount(
