@@ -94,6 +94,9 @@ def operator_at(config: pytest.Config) -> BenchOperator:
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, opened: TestRig | str) -> Iterator[StagedBench]:
     report, stage = report_of(request.config), stage_of(request.path)
+    joint = request.getfixturevalue("joint") if "joint" in request.fixturenames else ""
+    if joint and isinstance(opened, TestRig) and joint not in opened.configuration.rig.joints:
+        pytest.skip(f"this rig has no {joint}")  # which is no part of the report
     report.begin(stage, request.node.name)
     moves = getattr(request.module, "MOVES", "")
     obstacle = report.obstacle(stage) or (moves and report.own_obstacle(stage, request.node.name))

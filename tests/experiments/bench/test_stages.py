@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from command_line.init.new_file import NewRobot, new_file
+from control.records import Rig
 from simulation.harness.local_setup import write_local_setup
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, STAGES
 from tests.folders import ROOT
@@ -22,6 +24,15 @@ def run_bench(report: Path, *options: str) -> tuple[int, str, dict[str, Any]]:
 def test_a_sound_robot_passes_every_stage(tmp_path: Path) -> None:
     status, _, reported = run_bench(tmp_path / "report.json", "--simulated")
     assert reported["stages"] == dict.fromkeys(STAGES, PASSED)
+    assert status == 0
+
+
+def test_a_rig_of_two_motors_passes_every_stage(tmp_path: Path) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text(new_file(NewRobot(rig=Rig(("right",)), drive_type="moteus")), encoding="utf-8")
+    status, _, reported = run_bench(tmp_path / "report.json", "--simulated", "--config", str(path))
+    assert reported["stages"] == dict.fromkeys(STAGES, PASSED)
+    assert not any("left" in test["test"] for test in reported["tests"])
     assert status == 0
 
 
