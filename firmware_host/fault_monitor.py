@@ -44,6 +44,7 @@ POSE_FORGOTTEN_S = 10.0  # a pose source that is silent for longer counts as swi
 BROKEN = frozenset(
     {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
 )  # detected in single ticks, but lasting until torque is off
+NO_STRIDE = -9
 CATCH_UP_S = 0.3  # a sweep that the mud held at the far end of a stance needs 0.15 s for its 1 rad
 IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY, Phase.STROKE})
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
@@ -93,7 +94,8 @@ class FaultMonitor:
         self._foreign_commands = {health.joint: health.foreign_commands for health in drives.health}
         self._refused_commands = drives.refused_commands
         self._held_back_s = dict.fromkeys(joints, NEVER_S)  # by the mud
-        self._lagging_strides = dict.fromkeys(joints, (-9, -9))  # the last two in which a joint lagged in its swing
+        # when the walk began, and its last two strides in which a joint lagged in its swing
+        self._lagging_strides = dict.fromkeys(joints, (NEVER_S, NO_STRIDE, NO_STRIDE))
         self._sound: dict[str, DriveHealth | None] = dict.fromkeys(joints)  # the last report in which nothing was wrong
         self._pose_stamp_s: float | None = None
         self._asks_drives = configuration.emergency_stop.source == "drives"
@@ -217,9 +219,12 @@ class FaultMonitor:
             self._held_back_s[joint] = tick.now_s
         if tick.now_s - self._held_back_s[joint] < CATCH_UP_S:
             return True
-        before, last = self._lagging_strides[joint]
+        since_s, before, last = self._lagging_strides[joint]
+        if monitor_input.mode_since_s != since_s:
+            last = NO_STRIDE
         if monitor_input.stride != last:
-            self._lagging_strides[joint] = before, last = last, monitor_input.stride
+            before, last = last, monitor_input.stride
+        self._lagging_strides[joint] = monitor_input.mode_since_s, before, last
         return monitor_input.stride >= 0 and before != last - 1
 
     def _moves_in_air(self, joint: str, monitor_input: MonitorInput) -> bool:

@@ -11,7 +11,7 @@ from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
 from control.monitors.motion_monitor import PROBED
 from control.rate import PERIOD_S
-from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, same_for_all
+from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, JointTarget, Phase, same_for_all
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
@@ -298,6 +298,22 @@ def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: B
     assert ticks(Mode.WALKING, True) == []
     assert ticks(Mode.DAMPING, False) == []
     assert set(reported(ticks(Mode.WALKING, False))) == {("joint_not_following", "left_sweep")}
+
+
+def test_a_joint_may_lag_in_one_swing_of_a_walk_but_not_in_two_in_a_row(bench: Bench) -> None:
+    """Two swings of two walks are not in a row, whatever their numbers."""
+    off = same_for_all(JointTarget(0.5, 0.0))
+
+    def swing(walk_s: float, stride: int) -> set[tuple[str, str]]:
+        found: list[Fault] = []
+        for _ in range(240):
+            found += bench.tick(Mode.WALKING, mode_since_s=walk_s, phase=Phase.SWING, stride=stride, targets=off)
+        return set(reported(found))
+
+    everywhere = {("following_error", joint) for joint in JOINTS}
+    assert [swing(1.0, stride) for stride in (0, 2, 4, 5)] == [set(), set(), set(), everywhere]
+    assert [swing(2.0, stride) for stride in (5, 7, 8)] == [set(), set(), everywhere]
+    assert [swing(3.0, stride) for stride in (9, 10)] == [set(), everywhere]
 
 
 @pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
