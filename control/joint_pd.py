@@ -20,7 +20,7 @@ from control.records import (
 )
 
 LOOP_DELAY_S = 0.002 + PERIOD_S / 2.0  # the age of a position, and half of the tick for which a torque is held
-LEAST_MARGIN_RAD = radians(5.0)  # with that delay; the defaults have 19 and 22 degrees
+LEAST_MARGIN_RAD = radians(5.0)  # with that delay; the defaults have 19 and 21 degrees
 
 
 def phase_margin_rad(stiffness_nm_rad: float, damping_nm_s_rad: float, inertia_kg_m2: float) -> float:

@@ -29,7 +29,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  its stop. From one reversal at which the joint is slow to the next is an interval there, in which the
                  path that remains counts against the mean torque.
 
-Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
+Each sum is one of differences between two samples: none is added over a gap, and after a jump of the encoder all sums
+begin again.
 
 A joint that waits too long for its next command still follows the one before, and moves past its target although it
 obeys. Oscillation and following therefore count only where samples and ticks were punctual for a while. On a robot,
