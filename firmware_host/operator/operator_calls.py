@@ -9,7 +9,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import degrees, inf
+from math import degrees, inf, isfinite
 from typing import Any
 
 from control.controller import WalkOrder
@@ -20,7 +20,7 @@ from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath
-from control.records import JOINTS, UNKNOWN
+from control.records import JOINTS
 from estimation.ground_law import law_of_strides
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.gait_checks import depth_problem, gait_problems
@@ -166,7 +166,8 @@ class OperatorCalls:
     def _stride_supply_v(self) -> float | None:
         """Return the lowest voltage of any drive in the last stride."""
         last = self._loop.learning.strides[-len(self._rig.flippers) :]
-        return known(min([closed.supply_min_v for closed in last], default=UNKNOWN))
+        reported_v = (closed.supply_min_v for closed in last if isfinite(closed.supply_min_v))
+        return min(reported_v, default=None)
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Return the first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""

@@ -11,6 +11,7 @@ from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import LONGEST_TEXT
+from firmware_host.mud_learning import ClosedStride
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
@@ -20,6 +21,7 @@ from firmware_host.trial import BEGUN, OperatorReport, from_json, read_report
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.control.synthetic_muds import stride as closed_stride
 from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 
@@ -379,6 +381,17 @@ def test_what_moves_the_robot_refuses_unknown_parameters_and_other_methods_ignor
             robot.ask(method, wtaer="49")
     assert robot.ask("hello", later_version=1) == robot.ask("hello")
     assert robot.ask("stop", reason="lunch") == "accepted"
+
+
+@pytest.mark.parametrize(
+    ("reported_v", "lowest_v"), [((nan, 23.0), 23.0), ((23.0, nan), 23.0), ((24.0, 23.0), 23.0), ((nan, nan), None)]
+)
+def test_a_flipper_whose_drives_report_no_voltage_hides_not_that_of_the_other(
+    robot: Robot, reported_v: tuple[float, float], lowest_v: float | None
+) -> None:
+    closed = [ClosedStride(number, closed_stride(), 0.03, each_v) for number, each_v in enumerate(reported_v)]
+    robot.steps.loop.learning.strides = closed
+    assert robot.ask("status")["stride_supply_min_v"] == lowest_v
 
 
 def test_a_walk_with_a_null_depth_adapts_its_depth(armed: Robot) -> None:
