@@ -61,15 +61,19 @@ class Mit(DriveType):
         return Frame((node_id & LARGEST_ID) + DAMIAO_OFFSET, codec.encode_answer(answer, MODEL))
 
     def read_frame(self, frame: Frame) -> FrameContent | None:
-        """A CubeMars answers under its own id, with that id as the first byte, which no command of this program has."""
+        """A CubeMars answers under its own id, with that id as the first byte, which no command of this program has.
+
+        Of an answer under id 0, also a RobStride's, the temperature is read as that of an older CubeMars.
+        """
         identifier, data = frame.arbitration_id, frame.data
         if not frame.is_plain:
             return None
         if identifier == codec.REGISTER_ID and data:
             return FrameContent(data[0] & LARGEST_ID)
-        if identifier == codec.ROBSTRIDE_MASTER and data:
+        if identifier in (MASTER_ID, codec.ROBSTRIDE_MASTER) and data:
             signals = ("error",) if codec.is_faults(data) else SIGNALS
-            return FrameContent(data[0] & LARGEST_ID, signals=signals, spans=WIDE_TEMPERATURE)
+            spans = WIDE_TEMPERATURE if identifier else DRIVE_TEMPERATURE
+            return FrameContent(data[0] & LARGEST_ID, signals=signals, spans=spans)
         node_id = identifier & LARGEST_ID
         if identifier > DAMIAO_OFFSET + LARGEST_ID or not node_id:
             return None

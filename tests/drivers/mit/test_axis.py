@@ -11,6 +11,7 @@ from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit import codec
 from drivers.mit.axis import MitAxis
 from drivers.mit.codec import Answer
+from drivers.mit.drive_type import SIGNALS, Mit
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import PMAX
@@ -163,6 +164,17 @@ def test_a_fault_that_a_robstride_reports_when_asked_ends_the_mode_until_it_is_c
     assert bench.last == codec.CLEAR
     bench.hear(master, codec.encode_faults(NODE, 0))
     assert not bench.answer().closed_loop and not bench.axis.health.active_errors
+
+
+@pytest.mark.parametrize(("model", "identifier"), [(CUBEMARS, 0), (CUBEMARS, NODE), (ROBSTRIDE, 0), (ROBSTRIDE, 0xFD)])
+def test_an_answer_is_read_as_its_drive_s_wherever_it_is_heard(model: str, identifier: int) -> None:
+    """The bench counts such frames, and injected failures change them."""
+    bench = Bench(model)
+    assert identifier in bench.axis.receivers
+    data = codec.encode_answer(Answer(NODE, 0, 0.1, 0.2, 0.3, 30.0, 0), bench.model)
+    content = Mit().read_frame(Frame(identifier, data))
+    assert content is not None
+    assert (content.node_id, content.is_command, content.signals) == (NODE, False, SIGNALS)
 
 
 def test_another_program_that_stops_a_cubemars_is_believed() -> None:
