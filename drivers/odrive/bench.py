@@ -7,6 +7,7 @@ examples/can_enumerate.py of odriverobotics/ODriveResources.
 """
 
 from collections.abc import Iterable, Sequence
+from operator import itemgetter
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import DriveBench, SetupFacts
@@ -29,16 +30,17 @@ class CanSimpleBench(DriveBench):
 
 class OdriveBench(CanSimpleBench):
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
-        versions = {
-            node_id: codec.GET_VERSION.decode(frames[-1].data)
+        versions = {  # the oldest first: where two drives answer, it may take the next request for a new id
+            node_id: sorted({codec.GET_VERSION.decode(frame.data) for frame in frames}, key=itemgetter(slice(4, 7)))
             for node_id, frames in ask(port, IDS, codec.GET_VERSION).items()
         }
-        with_number = [node_id for node_id, version in versions.items() if version[4:7] >= codec.FIRST_WITH_ADDRESS]
+        with_number = [node_id for node_id, (each, *_) in versions.items() if each[4:7] >= codec.FIRST_WITH_ADDRESS]
         numbered = ask(port, with_number, codec.ADDRESS)
-        found = []
-        for node_id, version in sorted(versions.items()):
+        found: list[FoundDrive] = []
+        for node_id, reported in sorted(versions.items()):
             numbers = {codec.decode_serial_number(frame.data) for frame in numbered.get(node_id, ())}
-            found += [found_drive(node_id, version, number) for number in sorted(numbers or {""})]
+            with_numbers = [found_drive(node_id, reported[0], number) for number in sorted(numbers)]
+            found += with_numbers or [found_drive(node_id, version) for version in reported]
         no_id = "it has no id yet: set axis0.config.can.node_id"
         return [each._replace(problem=no_id) if each.node_id == NO_ID else each for each in found]
 

@@ -117,6 +117,20 @@ def test_two_drives_with_one_id_are_named_with_both_serial_numbers(
     assert f"id 3 answers 2 times ({name}" in problem and all(serial in problem for serial in serials)
 
 
+@pytest.mark.parametrize("old_first", [True, False])
+def test_no_serial_number_is_asked_for_where_one_of_two_drives_would_take_it_for_a_new_id(old_first: bool) -> None:
+    old = simulated("odrive", 3)
+    version, identifier = bytes([2, 0, 0, 0, 0, 6, 8, 0]), odrive.arbitration_id(3, odrive.GET_VERSION)
+    old.receive = lambda frame, now_s: [  # type: ignore[method-assign]
+        Frame(identifier, version) for _ in range(frame.is_remote and frame.arbitration_id == identifier)
+    ]
+    drives = [old, simulated("odrive", 3)]
+    bus = SimulatedBus(*drives[:: 1 if old_first else -1])
+    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False).found)
+    assert "id 3 answers 2 times" in problem
+    assert odrive.arbitration_id(3, odrive.ADDRESS) not in {frame.arbitration_id for frame in bus.sent}
+
+
 def test_an_id_that_answers_in_two_protocols_is_named() -> None:
     bus = SimulatedBus(simulated("odrive", 3), simulated("mit", 3))
     (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False, ("odrive", "mit")).found)
