@@ -297,6 +297,7 @@ class Loop:
             self.controller.gait.next_parameters = gait
         self.controller.order = self.controller.order._replace(depth_m=depth_m, adaptive=False, depths_m=())
         self.controller.gait.next_depth_m = depth_m
+        self.learning.depth_reason = "fixed"
 
     def move(self, angles_rad: Mapping[str, float], speed_rad_s: float, now_s: float, by: str) -> None:
         """Move joints slowly to these angles, while the pose is held."""

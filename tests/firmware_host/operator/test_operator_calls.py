@@ -413,6 +413,8 @@ def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(a
     armed.ask("depth", depth_m=0.02)
     armed.steps.step()
     assert loop.stride_depth_m == begun_m != 0.02
+    report = armed.ask("status")
+    assert (report["next_depth_m"], report["depth_reason"]) == (0.02, "fixed")
     armed.steps.run_until(lambda: loop.target.stride == 3, 20.0)
     assert loop.stride_depth_m == 0.02 and armed.events.texts.count(f"depth 0.0200 m by {ANNA}") == 1
 
