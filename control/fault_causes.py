@@ -75,7 +75,7 @@ class AgedFault(NamedTuple):
 def is_settling(fault: Fault, heard_s: float) -> bool:
     """Return whether a drive may still answer, `heard_s` after the first time at which all of them were heard.
 
-    What is settling blocks arming, and is neither shown nor logged.
+    What is settling blocks arming, and is no cause in the status nor logged.
     """
     return fault.kind in ASKED and heard_s < ANSWERED_S
 

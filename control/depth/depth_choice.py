@@ -17,7 +17,8 @@ times that of the insertion. So an insertion ends at 1/1.3 of the torque that an
 continues at the depth commanded by then. (Under the stance's load the flipper sinks further, by up to 1 cm.)
 
 Mud can be too soft to be felt: the torques of the stance are then those of friction, and nothing is known of the
-thrust. A body that stays where it is will do so at the same depth, so the next stride is deeper by a quarter.
+thrust. A body that stays where it is will do so at the same depth, so the next stride is deeper by a quarter, also
+where no pose shows whether it stays.
 
 The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its width and depth.
 """
@@ -136,7 +137,7 @@ class DepthAdaptation:
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[DepthChoice]:
-        """Choose the next stride; without an estimate of the thrust a deeper one where the body does not advance."""
+        """Choose the next stride; without an estimate of the thrust a deeper one unless the body advances."""
         yield from self.prepare()
         self.forecast.update(mud_estimate, strides, walked_m)
         yield

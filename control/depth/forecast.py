@@ -4,9 +4,9 @@ The mud of one flipper withstands f_x = k_s(z) ∫ζ dA in the middle of the swe
 gives a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both depend on the one
 strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N mud, 1.8 cm), and
 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the ratio starts
-between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The larger of
-both estimates counts, since each is on the safe side. The same k_s holds the body back by its pad: there the safe side
-is above the estimate.
+between, is corrected whenever k_s and k_p of both flippers together are known, and is never trusted to better than a
+fifth. The larger of both estimates counts, since each is on the safe side. The same k_s holds the body back by its pad:
+there the safe side is above the estimate.
 
 The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the fraction of it at the peak:
 k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the peak is less than k_e Φ
