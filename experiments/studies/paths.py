@@ -1,15 +1,16 @@
 """The coefficients from paths that are no crutching gait, and how well they predict the next stride.
 
-Each gait that ships walks through muds of known strength, with the disturbances of `estimation`. The truth of an
-estimate is a plate on a virtual load cell in the mud that the flipper met, at the speed and the depth that the estimate
-names (experiments/trials/load_cell_truth.py), so no gait is the reference of another one. The next stride is predicted
-by what the robot remembers before it, at the depth that it reaches: its force is the coefficient times a geometry that
-is known.
+Each gait that ships walks over grounds of three laws, with the disturbances of `grounds`. The truth of an estimate is a
+plate on a virtual load cell in the ground that the flipper met, at the speed and the depth that the estimate names
+(experiments/trials/load_cell_truth.py), so no gait is the reference of another one. The next stride's torques are
+predicted by what the robot remembers before it, at the depth that it reaches: the coefficient times a geometry that is
+known. They are compared with the ground's true torques wherever the coefficient is fitted, and the root mean square of
+the difference is given as a fraction of the stride's largest torque, next to the one that the law itself leaves
+(experiments/trials/predicted_load.py).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import log
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,73 +19,85 @@ from pandas import DataFrame
 
 from control.gait.stride_table import crutching_parameters
 from control.geometry import FlipperGeometry
+from control.mud_estimate import FlipperEstimate
 from control.records import COEFFICIENTS, UNKNOWN, Estimate, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters
 from estimation.knowledge import MudKnowledge
 from experiments.reports.coefficient_table import compared_frame, compared_rows
-from experiments.reports.error_table import error_frame
+from experiments.reports.error_table import Row, error_frame
+from experiments.studies.estimation import ENDLESS_M
+from experiments.studies.grounds import GROUNDS, disturbances_on
 from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.load_cell_truth import REVERSAL_FRACTION, FlipperTruths, true_strides
-from experiments.trials.trial import LATENCY_S, TORQUE_ERROR, WALKING, Setup, replay_trial, run_trial
+from experiments.trials.predicted_load import LoadError, load_errors
+from experiments.trials.trial import (
+    LATENCY_S,
+    TORQUE_ERROR,
+    WALKING,
+    Setup,
+    Trial,
+    replay_trial,
+    run_trial,
+)
 from firmware_host.configuration.gait_file import gait_document, read_gait
 from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
-from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
 GAITS = ("walking", "measuring", "ellipse", "alternating", "backward")
-ENDLESS_M = 1000.0
+WALKED = ("clay-0.8", "clay-1.4", "clay-3.6", "thixotropic", "sand-generic")
+UNPREDICTED = LoadError(UNKNOWN, UNKNOWN)
+KEYS = {"gait": "setup", "ground": "mud", "law": "mud"}  # of the rows of estimates
 
 
 def study(
     trials: Trials,
     *,
     gait: Annotated[tuple[str, ...], Option("name of a gait that ships, or a file", metavar="GAIT")] = GAITS,
-    strength: Annotated[tuple[float, ...], Option("of a mud", low=100, high=5e4, unit="Pa")] = (800.0, 1400.0, 3600.0),
+    ground: Annotated[tuple[str, ...], Option("ground", choices=tuple(GROUNDS))] = WALKED,
     depth: Annotated[float, Option("of insertion", low=1, high=5, unit="cm")] = 3.0,
     strides: Annotated[int, Option("of a walk", low=3, high=200)] = 8,
-    seeds: Annotated[int, Option("walks in each mud", low=1, high=100)] = 5,
+    seeds: Annotated[int, Option("walks on each ground", low=1, high=100)] = 5,
 ) -> Result:
-    """The coefficients of a mud from paths other than the crutching gait."""
+    """The coefficients of a ground from paths other than the crutching gait."""
     for name in gait:
         read_gait(gait_document(name))  # refused before anything runs
     walked = {"depth_m": depth / 100.0, "strides": strides}
     rows = [
-        {"gait": name, "strength_pa": each, "seed": seed, **walked}
+        {"gait": name, "ground": each, "seed": seed, **walked}
         for name in gait
-        for each in strength
+        for each in ground
         for seed in range(1, seeds + 1)
     ]
     walks = trials.run(walk, rows)
-    estimates = [row for each in walks["estimates"] for row in each]
-    found = compared_frame(estimates).assign(predicted=[row["predicted"] for row in estimates])
-    speeds = walks.groupby(["gait", "strength_pa"], sort=False)[["speed_cm_s", "stuck"]].mean().reset_index()
+    found = with_load_errors([row for each in walks["estimates"] for row in each])
+    by_law = found.assign(mud=found["mud"].str.partition("-")[0])
+    speeds = walks.groupby(["gait", "ground"], sort=False)[["speed_cm_s", "stuck"]].mean().reset_index()
     return Result(
         tables=[
-            Table("speeds", "Advance by gait", {"strength_pa": "Pa", "speed_cm_s": "cm/s"}, speeds),
-            Table("errors", "Errors by gait and mud", {}, errors_of(found, "setup", "mud", "coefficient")),
-            Table("pooled", "Errors by gait, all muds", {}, errors_of(found, "setup", "coefficient")),
-            Table("overall", "Errors of all gaits and muds", {}, errors_of(found, "coefficient")),
+            Table("speeds", "Advance by gait", {"speed_cm_s": "cm/s"}, speeds),
+            Table("errors", "Errors by gait and ground", {}, errors_of(found, "gait", "ground", "coefficient")),
+            Table("pooled", "Errors by gait and law", {}, errors_of(by_law, "gait", "law", "coefficient")),
+            Table("laws", "Errors by law, all gaits", {}, errors_of(by_law, "law", "coefficient")),
         ],
         figures=[Figure("paths", "Estimate over truth by gait; the band is 10 %.", lambda: draw(found))],
     )
 
 
-def walk(gait: str, strength_pa: float, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
-    """Return the speed of a walk, and its estimates with their truths and predictions."""
-    clay = Clay(f"{strength_pa:g} Pa", strength_pa)
-    track = Track([(ENDLESS_M, clay)])
-    trial = run_trial(setup_of(gait, depth_m), track, LAB, strides, seed, TORQUE_ERROR, LATENCY_S)
+def walk(gait: str, ground: str, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
+    """Return the speed of a walk, and its estimates with their truths and the errors of their predictions."""
+    track, on = Track([(ENDLESS_M, GROUNDS[ground])]), disturbances_on(GROUNDS[ground], LAB)
+    trial = run_trial(setup_of(gait, depth_m), track, on, strides, seed, TORQUE_ERROR, LATENCY_S)
     first, last = trial.samples[0], trial.samples[-1]
     closed = [stride for stride, _ in replay_trial(trial, EstimationParameters(surface_error_m=LAB.surface_error_m))]
     met = {(truth.flipper, truth.index): truth for truth in trial.truths}
     geometry = trial.configuration.geometry
     strokes = [_strokes_of(each, met[key], geometry) for each in closed if (key := (each.flipper, each.index)) in met]
-    truths = true_strides(strokes, trial.configuration, LAB.relaxation)
-    rows = _compared(closed, truths, mud=clay.name, setup=gait, method="default", trial=seed)
+    truths = true_strides(strokes, trial.configuration, on.relaxation)
+    rows = _compared(trial, truths, closed, mud=ground, setup=gait, method="default")
     return {
         "speed_cm_s": 100.0 * (last.body.x_m - first.body.x_m) / (last.now_s - first.now_s),
         "stuck": sum(not each.released for each in closed),
@@ -101,12 +114,16 @@ def setup_of(gait: str, depth_m: float) -> Setup:
 
 
 def _strokes_of(stride: StrideEstimate, met: StrideTruth, geometry: FlipperGeometry) -> StrideTruth:
-    """Return the strokes that the estimates name in the mud that the flipper met, for a load cell to repeat."""
+    """Return the strokes that the estimates name in the ground that the flipper met, for a load cell to repeat.
+
+    Of a path only the whole stay is known (path_reference.py): what it is longer than the way down and up is across.
+    """
+    across_m = met.stance.path_m or max(0.0, met.insertion.path_m - 2.0 * met.insertion.deepest_m)
 
     def stroke(estimate: Estimate, part: float = 1.0) -> StrokeTruth:
         nominal_m = estimate.depth_m / part + stride.surface_m
         lean_rad, depth_m = geometry.adduction_rad(0.0, nominal_m), nominal_m - met.surface_m
-        return StrokeTruth(0.0, lean_rad, depth_m, estimate.speed_m_s, UNKNOWN, depth_m)
+        return StrokeTruth(0.0, lean_rad, depth_m, estimate.speed_m_s, UNKNOWN, depth_m, across_m)
 
     return replace(
         met,
@@ -116,25 +133,39 @@ def _strokes_of(stride: StrideEstimate, met: StrideTruth, geometry: FlipperGeome
     )
 
 
-def _compared(closed: Sequence[StrideEstimate], truths: FlipperTruths, **keys: Any) -> Iterator[dict[str, Any]]:
-    """Yield the rows of each stride, with the logarithm of predicted over estimated value."""
+def _compared(trial: Trial, truths: FlipperTruths, closed: Sequence[StrideEstimate], **keys: Any) -> Iterator[Row]:
+    """Yield the rows of each stride, with the error of the load that the strides before it predict."""
     knowledge = MudKnowledge()
     for stride in closed:
-        remembered = knowledge.mud_estimate.of(stride.flipper)
+        errors = _load_errors(trial, stride, knowledge.mud_estimate.of(stride.flipper))
         for row in compared_rows(stride_report(stride), truths.get((stride.flipper, stride.index), {}), **keys):
-            before, row["predicted"] = getattr(remembered, row["coefficient"]), UNKNOWN
-            if row["kind"] == "value" and before is not None and not before.at_least:
-                row["predicted"] = log(before.at(row["depth_m"])[0] / row["value"])
             if row["truth"] is not None or row["kind"] == "not valid":  # which may name no depth
-                yield row
+                yield row | {"trial": trial.seed, "load_error": errors.get(row["coefficient"], UNPREDICTED)}
         knowledge.update([stride])
 
 
-def errors_of(found: DataFrame, *keys: str) -> DataFrame:
-    """Return the errors by these keys, and the RMS error of the predictions."""
-    squares = found.assign(square=found["predicted"] ** 2).groupby(list(keys), sort=False)["square"].mean()
-    errors = error_frame(found, *keys).assign(prediction=squares.pow(0.5).to_numpy())
-    return errors.rename(columns={"setup": "gait"})
+def _load_errors(trial: Trial, stride: StrideEstimate, remembered: FlipperEstimate) -> Mapping[str, LoadError]:
+    predicted = {}
+    for name in COEFFICIENTS:
+        found, before = getattr(stride, name), getattr(remembered, name)
+        if before and not before.at_least and found.valid and not found.at_least:
+            predicted[name] = before.at(found.depth_m)[0]
+    loads = [load for load in trial.loads[stride.flipper] if stride.t_start_s <= load.now_s <= stride.t_end_s]
+    return load_errors(loads, trial.configuration.geometry, stride.surface_m, predicted)
+
+
+def with_load_errors(rows: Sequence[Row]) -> DataFrame:
+    """Return the frame of the estimates with the squares of both errors of their load."""
+    squares = np.square([row["load_error"] for row in rows]).T
+    return compared_frame(rows).assign(**dict(zip(LoadError._fields, squares, strict=True)))
+
+
+def errors_of(found: DataFrame, *names: str) -> DataFrame:
+    """Return the errors by these keys, and the root mean squares of the errors of the load."""
+    keys = [KEYS.get(name, name) for name in names]
+    squares = found.groupby(keys, sort=False)[[*LoadError._fields]].mean()
+    errors = error_frame(found, *keys).join(squares.pow(0.5).reset_index(drop=True))
+    return errors.rename(columns=dict(zip(keys, names, strict=True)))
 
 
 def draw(found: DataFrame) -> Drawing:

@@ -9,8 +9,8 @@ gap between their 50 to 210 distinct states a second cannot be seen in a log. Ei
 such a gap, so those of one joint are at most half of it apart: 2.6 ms at 190 a second.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import chain, repeat
 from random import Random
 from typing import Any, NamedTuple
@@ -54,6 +54,17 @@ class Sample(NamedTuple):
     body: BodyPose
 
 
+class TrueLoad(NamedTuple):
+    """One flipper, and what its ground does to it in one tick."""
+
+    now_s: float
+    phase: Phase
+    angles_rad: tuple[float, float]  # sweep and adduction
+    body_m: float  # along the track
+    sweep_nm: float  # of the ground on the joint
+    adduction_nm: float
+
+
 @dataclass(frozen=True)
 class Setup:
     """A gait, a base and a flipper for trials."""
@@ -80,6 +91,7 @@ class Trial:
     samples: Sequence[Sample]
     truths: Sequence[StrideTruth]
     seed: int
+    loads: Mapping[str, Sequence[TrueLoad]] = field(default_factory=dict)  # by flipper, in every tick
 
 
 def configuration_of(setup: Setup, drive_type: str = DEFAULT) -> Configuration:
@@ -113,17 +125,23 @@ def run_trial(
     robot = start_walk(configuration, track, seed, order, disturbances=disturbances, fixed_base=setup.fixed_base)
     reference = (PathReference if setup.path else StrokeReference)(configuration.rig)
     samples, truths = list[Sample](), list[StrideTruth]()
+    loads: dict[str, list[TrueLoad]] = {flipper: [] for flipper in configuration.rig.flippers}
     first, end_s = _sample_of(robot), robot.now_s + strides * LONGEST_STRIDE_S
     while len(truths) < len(configuration.rig.flippers) * strides and robot.now_s < end_s:
         robot.step()
         samples.append(_sample_of(robot))
         truths += reference.step(PERIOD_S, robot.robot.plant, samples[-1].phase)
+        for of_flipper, arm in zip(loads.values(), robot.robot.plant.arms, strict=True):
+            pose = (arm.sweep_rad, arm.adduction_rad), robot.robot.plant.body_m
+            torques_nm = arm.force.sweep_nm, arm.force.adduction_nm
+            of_flipper.append(TrueLoad(samples[-1].now_s, samples[-1].phase, *pose, *torques_nm))
     samples = with_latency(samples, Random(f"latency {seed}").uniform(-latency_s, latency_s))
     random, drives = Random(seed), list(configuration.flipper_drives)
     for i, drive in enumerate(drives):
         known = {name: getattr(drive, name) * (1.0 + random.gauss(0.0, torque_error)) for name in CONSTANTS}
         drives[i] = drive._replace(**known)
-    return Trial(configuration, tuple(drives), rows_of(first, samples, setup.row_period_s), truths, seed)
+    rows = rows_of(first, samples, setup.row_period_s)
+    return Trial(configuration, tuple(drives), rows, truths, seed, loads)
 
 
 def _sample_of(robot: Direct) -> Sample:
