@@ -3,9 +3,9 @@
 A multicast server sends its frames to a group that this client joins on one interface. A unicast server sends them to
 each client that has asked to connect and keeps sending requests. The server reports which version of the protocol it
 speaks; the configuration states it where requests do not reach the server. Nothing here waits: `receive` itself sends
-requests once a second, and asks to connect again where no position arrives: a server that was started later, or again,
-may speak another version. It runs in the bridge's process (natnet_bridge.py), where a malformed or a large packet
-cannot delay the loop.
+requests once a second, and all of them where no position arrives: a server that was started later, or again, may speak
+another version and have other bodies. It runs in the bridge's process (natnet_bridge.py), where a malformed or a large
+packet cannot delay the loop.
 
 A position is stamped with the time of its exposure as far as it is known. From version 3.0 on, frames contain the time
 from the exposure to the sending, and the least recent delay gives the difference of the clocks (pose_timing.py). The
@@ -77,7 +77,7 @@ class NatNetClient:
             self._asked_s = now_s
             unanswered = self._ticks_per_s is None or now_s - self._seen_s > REQUEST_S
             self.sockets.request(CONNECT if unanswered else KEEP_ALIVE)
-            if self.parameters.body and (self._models_changed or not self._id_known):
+            if self.parameters.body and (self._models_changed or unanswered):
                 self._models_changed = False
                 self.sockets.request(REQUEST_MODEL)
         for packet, sender in self.sockets.packets():
