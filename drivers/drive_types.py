@@ -28,11 +28,12 @@ DRIVE_TYPES: Mapping[str, DriveType] = {
     "mit": Mit(),
     "odrive05": Odrive05(),
 }
-# Those that can be found and set up, in the order in which a bus is searched: the first disturb no other drive.
+# Those that can be found and set up, in the order in which a bus is searched: the first disturb no other drive. On CAN
+# FD comes next what speaks it, because drives of classic CAN are on other buses.
 DRIVE_BENCHES: Mapping[str, DriveBench] = dict(
     sorted(
         ((name, each.bench) for name, each in DRIVE_TYPES.items() if each.bench is not None),
-        key=lambda item: (bool(item[1].disturbs), item[1].is_fd),
+        key=lambda item: (bool(item[1].disturbs), not item[1].is_fd),
     )
 )
 

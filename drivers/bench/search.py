@@ -1,7 +1,7 @@
 """Searches one bus for drives of every protocol, and compares what answers with what the configuration expects.
 
 The order matters. First it listens. ODrives are then asked by remote frames, which disturb no drive. The questions
-of the other protocols are commands to an ODrive, or frames that it takes for errors, so they are sent only where no
+of the other protocols are commands to other drives, or frames that they take for errors, so they are sent only where no
 drive of an earlier protocol has answered, or where a user asks for them by name.
 """
 

@@ -5,8 +5,8 @@ A Damiao answers a request that is no command, so what another program does with
 firmware of a Damiao, answers commands alone. Leaving the mode, which ends torque, is the only one that cannot exert it.
 To an ODrive of id 0 these frames are its commands 1 to 15 (an emergency stop among them), and the id of the registers,
 0x7FF, is the command to node 63 to enter the boot loader, and node 63 may mean all ODrives (their tools reboot all by
-it): they must not be sent where one listens.
-Sources: see codec.py; ODrive's CANSimple documentation.
+it): they must not be sent where one listens. 0x7FF also addresses all moteus, to which the state request writes a mode.
+Sources: see codec.py; ODrive's CANSimple documentation; fdcan_micro_server.h and moteus_controller.cc of mjbots/moteus.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -31,7 +31,7 @@ Values = dict[int, set[float]]  # of one id by register: two values where two dr
 
 
 class MitBench(DriveBench):
-    disturbs = "ODrives of id 0 take its questions for commands"
+    disturbs = "ODrives of id 0 and moteus take its questions for commands"
 
     def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
         """Return the ids of CubeMars drives that report in another protocol; one in MIT mode only answers."""

@@ -157,6 +157,12 @@ def test_where_an_odrive_answers_no_other_protocol_is_asked() -> None:
     assert {frame.is_remote for frame in bus.sent} == {True}
 
 
+def test_where_a_moteus_answers_no_classic_frame_that_it_takes_for_a_mode_is_sent() -> None:
+    bus = SimulatedBus(simulated("moteus", 3))
+    assert set(search(bus.bench_port(), DRIVE_BENCHES, True).not_asked) == {"mit"}
+    assert all(frame.is_remote or frame.is_fd for frame in bus.sent)
+
+
 def test_no_fd_frame_is_sent_on_a_bus_without_fd() -> None:
     bus = SimulatedBus()
     result = search(bus.bench_port(), DRIVE_BENCHES, False, ("moteus",))
