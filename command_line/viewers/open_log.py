@@ -23,13 +23,12 @@ LAYOUTS = Path(__file__).parent / "layouts"
 FOXGLOVE_PROGRAMS = ("lichtblick", "foxglove-studio", "foxglove")  # the first one that is installed
 
 
-def open_log(
-    log: Annotated[Path, Option("log of this project")],
-    *,
-    viewer: Annotated[
-        Literal["foxglove", "plotjuggler", "rerun"], Option("foxglove: Lichtblick or Foxglove", name="--with")
-    ],
-) -> int:
+Viewer = Annotated[
+    Literal["foxglove", "plotjuggler", "rerun"], Option("foxglove: Lichtblick or Foxglove", name="--with")
+]
+
+
+def open_log(log: Annotated[Path, Option("log of this project")], *, viewer: Viewer) -> int:
     _require_finished(log)
     programs: Sequence[str] = (viewer,)
     arguments, install = [str(log)], "install Rerun (pip install rerun-sdk)"

@@ -51,21 +51,7 @@ def load_errors(
 
 
 def _samples(loads: Sequence[TrueLoad], geometry: FlipperGeometry, surface_m: float) -> dict[str, FitSamples | None]:
-    insertion, stance, extraction = (Stroke(step_m) for step_m in STEPS_M.values())
-    motion = PathMotion()
-    for load in loads:
-        depth_m, swept_m = geometry.depth_m(*load.angles_rad), geometry.flipper_length_m * load.angles_rad[0]
-        is_path = load.phase is Phase.STROKE
-        phase = motion.update(depth_m, depth_m > surface_m) if is_path else load.phase
-        felt = *load.angles_rad, load.sweep_nm, load.adduction_nm, load.body_m, False
-        if phase is Phase.INSERTION:
-            insertion.update(load.now_s, depth_m, *felt)
-        elif phase is Phase.EXTRACTION:
-            extraction.update(load.now_s, depth_m, *felt)
-        if phase is Phase.STANCE or (is_path and depth_m > surface_m):
-            stance.update(load.now_s, swept_m, *felt)
-    if stance.batches and stance.batches[0].travel_m < stance.batches[-1].travel_m:
-        stance.mirror()  # of a walk backward
+    insertion, stance, extraction = _strokes(loads, geometry, surface_m)
     surface = unknown_surface(0.0)._replace(depth_m=surface_m)
     shear = finish(find_shear(geometry, stance.batches, surface_m, Base.FREE, 0.0))
     return {
@@ -73,3 +59,21 @@ def _samples(loads: Sequence[TrueLoad], geometry: FlipperGeometry, surface_m: fl
         "k_s": shear_samples(geometry, stance.batches, surface_m, shear),
         "k_e": extraction_samples(geometry, extraction.moving(), surface, extraction.first_m),
     }
+
+
+def _strokes(loads: Sequence[TrueLoad], geometry: FlipperGeometry, surface_m: float) -> list[Stroke]:
+    """Return insertion, stance and extraction; a path does them at once."""
+    strokes, motion = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}, PathMotion()
+    for load in loads:
+        depth_m, swept_m = geometry.depth_m(*load.angles_rad), geometry.flipper_length_m * load.angles_rad[0]
+        travels_m = {load.phase: swept_m if load.phase is Phase.STANCE else depth_m}
+        if load.phase is Phase.STROKE:
+            travels_m = {motion.update(depth_m, depth_m > surface_m): depth_m}
+            if depth_m > surface_m:
+                travels_m[Phase.STANCE] = swept_m
+        for phase in STEPS_M.keys() & travels_m:
+            felt = *load.angles_rad, load.sweep_nm, load.adduction_nm, load.body_m, False
+            strokes[phase].update(load.now_s, travels_m[phase], *felt)
+    if (across := strokes[Phase.STANCE].batches) and across[0].travel_m < across[-1].travel_m:
+        strokes[Phase.STANCE].mirror()  # of a walk backward
+    return [*strokes.values()]
