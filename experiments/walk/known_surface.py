@@ -4,7 +4,7 @@ The published method finds the surface where the upward force first passes 0.5 N
 to the flipper, that is far too deep. k_s depends on the square of the depth below the surface and becomes several times
 too large, so that the paper's statements on body drag cannot be tested. Here the surface is the default method's, and
 the rest is as published: f_x = cos α τ₁ / l over the steady part of the stance, fitted to k_s b z²/2, with or without
-half of the body's drag added while the body advances.
+a flipper's part of the body's drag, half of it with two, added while the body advances.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,8 @@ def k_s_of(profile: DataFrame, stride: Mapping[str, Any], configuration: Configu
     sweeps_rad, first = stance["sweep_rad"], stance.head(1)
     forces_n = np.cos(sweeps_rad) * stance["sweep_load_nm"] / geometry.flipper_length_m
     if drag_n:
-        forces_n += np.where(stance["body_x_m"] - first["body_x_m"].sum(min_count=1) > ADVANCED_M, drag_n / 2.0, 0.0)
+        own_n = drag_n / len(configuration.rig.flippers)
+        forces_n += np.where(stance["body_x_m"] - first["body_x_m"].sum(min_count=1) > ADVANCED_M, own_n, 0.0)
     steady = forces_n.notna() & (sweeps_rad.abs() <= STEADY_FRACTION * first["sweep_rad"].abs().sum())
     submerged_m = stance["depth_m"] - (stride["surface_m"] or 0.0)
     for depth_m, force_n in zip(submerged_m[steady].tolist(), forces_n[steady].tolist(), strict=True):

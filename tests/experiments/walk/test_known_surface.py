@@ -1,10 +1,12 @@
 """The paper's law below a known surface gives the right coefficient, also while the body advances."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pandas import DataFrame
 
-from control.records import Phase
+from control.records import Phase, Rig
 from experiments.walk.known_surface import k_s_of
 from tests.experiments.synthetic_strides import CONFIGURATION, GEOMETRY, make_profile, make_stride
 
@@ -31,6 +33,12 @@ def test_the_law_below_the_known_surface_has_half_of_the_drag_while_the_body_adv
     estimate = k_s_of(stance(advance_m), make_stride(surface_m=SURFACE_M), CONFIGURATION, drag_n)
     assert estimate["valid"]
     assert estimate["value"] == pytest.approx(K + added_n / MOMENT_M3)
+
+
+def test_a_single_flipper_bears_the_whole_drag() -> None:
+    alone = replace(CONFIGURATION, rig=Rig(("right",)))
+    estimate = k_s_of(stance(0.1), make_stride(surface_m=SURFACE_M), alone, 2.5)
+    assert estimate["value"] == pytest.approx(K + 2.5 / MOMENT_M3)
 
 
 def test_a_stride_without_rows_gives_no_estimate() -> None:
