@@ -133,8 +133,9 @@ def speed_table(report: Summary) -> Table:
             cells = {mud: _paper_text(report, gait, mud) for mud in row}
             of_paper = fmean(speed.mean for speed in PAPER_TABLE[gait].values())
             rows.append({"speed": "  paper", **cells, "all muds": number(of_paper, 2)})
-    trials = counted(report["settings"]["seeds"], "trial")
-    title = f"Table I: speed after the second stride in each mud, mean ± sd of {trials}"
+    trials = [cell["trials"] for row in report["table"].values() for cell in row.values()]  # that reached the mud
+    fewest = f"{min(trials)} to " * (min(trials) < max(trials))
+    title = f"Table I: speed after the second stride in each mud, mean ± sd of {fewest}{counted(max(trials), 'trial')}"
     return Table("table", title, {"speed": "cm/s"}, DataFrame(rows).rename(columns=mud_label), "Table I")
 
 

@@ -7,7 +7,15 @@ from typing import Any
 import pytest
 
 from experiments.trackway.simulated_walk import end_of, walk_trackway
-from experiments.trackway.table_one import FIXED_DEPTHS_M, PAPER_TABLE, Speed, speed_cell, table_one, within_one_sd
+from experiments.trackway.table_one import (
+    FIXED_DEPTHS_M,
+    PAPER_TABLE,
+    Speed,
+    speed_cell,
+    speed_table,
+    table_one,
+    within_one_sd,
+)
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import COMPARTMENT_M
@@ -62,6 +70,14 @@ def test_every_mud_has_the_same_weight_in_the_mean_over_muds_and_one_that_was_no
 
     assert mean("a", "b") == {"mean": 4.5, "mean_all": 4.5}
     assert mean("a", "b", "c") == {"mean": None, "mean_all": None}
+
+
+def test_the_title_counts_the_trials_that_are_in_the_table() -> None:
+    both, one = Walk([stride(0.1, "a"), stride(0.1, "b")], ""), walked(0.1)
+    settings = {"mud_length_cm": dict.fromkeys("ab", 61.0), "seeds": 3}
+    for walks, count in (([both, one], "1 to 2 trials"), ([both, both, both], "3 trials"), ([both], "1 trial")):
+        table = speed_table(table_one({"3 cm": walks}, ARM_M, {}, settings))
+        assert table.title.endswith(f"mean ± sd of {count}")
 
 
 # in simulation
