@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from itertools import chain, pairwise
 from math import nan
+from statistics import stdev
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -133,7 +134,7 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
     deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
     rows = [
-        _bar(
+        bar_of(
             label,
             colour or looks[f"{each['depth_cm']:g} cm"]["color"],
             each,
@@ -152,7 +153,7 @@ def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -
     return figure
 
 
-def _bar(
+def bar_of(
     label: str, colour: Any, depth: Mapping[str, Any], found: GatheredCoefficient | float | None
 ) -> tuple[str, float, float, Any, str, str]:
     """Return name, value, standard deviation of the trials, colour, text and hatch; a lower bound is hatched."""
@@ -163,7 +164,7 @@ def _bar(
     return (
         f"{label}\n{depth['depth_cm']:g} cm",
         value,
-        value * (gathered.repeatability or 0.0) if gathered else 0.0,
+        stdev(gathered.trials) / N_CM3 if gathered and len(gathered.trials) > 1 else 0.0,
         colour,
         f"{'≥ ' * bound}{number(value)}",
         "//" * bound,

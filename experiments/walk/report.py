@@ -77,8 +77,8 @@ FIGURE_6 = (
 )
 FIGURE_7 = (
     "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
-    "strides; hatched: a lower bound. The paper's law is used with the default method's surface, because its own "
-    "trigger at 0.5 N finds the surface of soft mud too deep."
+    "strides; hatched: a lower bound, with the median. The paper's law is used with the default method's surface, "
+    "because its own trigger at 0.5 N finds the surface of soft mud too deep."
 )
 FINDINGS = "The paper's findings, and ours by its law below the default method's surface"
 Report = dict[str, Any]  # the summary, as it is in JSON
