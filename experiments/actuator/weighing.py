@@ -192,7 +192,7 @@ class JointWeighing:
         """Return the entry of the notebook; nothing where the weight is hung again."""
         assert self._held is not None
         trouble = ""
-        for _ in range(MOST_REPEATS):
+        for left in reversed(range(MOST_REPEATS)):
             try:
                 reading = self._held.read()
             except MovedError as problem:
@@ -201,23 +201,24 @@ class JointWeighing:
                 return self._checked(step, reading)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
             question = f"{step.name} did not come to rest: {trouble}. Let it hang still and touch nothing."
-            if self._operator.ask(question, answers, self._attend_hold) == SKIP:
+            if not left or self._operator.ask(question, answers, self._attend_hold) == SKIP:
                 break
         self._operator.report(f"{step.name} of trial {step.reported_trial} is left out: {trouble}.")
         return {"skipped": trouble}
 
     def _checked(self, step: WeighingStep, reading: Entry) -> Entry | None:
-        """Ask about a reading of another weight at most MOST_REPEATS times; then keep it as doubtful."""
+        """Ask about a reading of another weight, which may be repeated until there are MOST_REPEATS of them."""
         entries = self._notebook.entries
         mismatch = find_mismatch(self._plan, entries, step, reading["current_a"], self._constant_nm_a)
         if mismatch is None:
             loops = None if step.weight_g else self._measure_friction()
             return self._reported(step, reading | ({"loops": loops} if loops else {}))
         message, other_g = mismatch
-        answers = {GO_ON: "read it again", KEEP: "keep it, marked as doubtful"}
+        self._mismatches[step.key] += 1
+        answers = {GO_ON: "read it again"} if self._mismatches[step.key] < MOST_REPEATS else {}
+        answers[KEEP] = "keep it, marked as doubtful"
         if other_g is not None:
             answers[OTHER] = f"it was the {other_g:g} g"
-        self._mismatches[step.key] += 1
         # the reading counts even if the robot lets go
         answer = self._operator.ask(f"{step.name}: {message}", answers, self._attend)
         if answer == OTHER and other_g is not None:
@@ -226,7 +227,7 @@ class JointWeighing:
                 self._operator.report(f"{other.name} of trial {other.trial} was read already and is not replaced.")
             else:
                 self._notebook.write(other.key, self._reported(other, reading))
-        elif answer == KEEP or self._mismatches[step.key] >= MOST_REPEATS:
+        elif answer == KEEP:
             return self._reported(step, reading | {"doubt": message})
         return None
 

@@ -1,6 +1,7 @@
 """The sequence of a calibration: the operator's answers, failures, and continuation."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,7 +9,7 @@ from experiments.actuator import weighing
 from experiments.actuator.friction import Loop
 from experiments.actuator.plan import WeighingStep, steps_of
 from experiments.actuator.reading import MovedError
-from experiments.actuator.weighing import KEEP, OTHER
+from experiments.actuator.weighing import KEEP, MOST_REPEATS, OTHER
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON
 from tests.experiments.actuator.scripted_weighing import LOOP, PLAN, Case, ScriptedJoint
@@ -133,3 +134,18 @@ def test_a_mismatched_reading_is_repeated_or_kept_as_doubtful(case: Case) -> Non
     case.on(WeighingStep(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[WeighingStep(2, 400.0).key]
     assert "slip off" in entry["doubt"] and len(case.operator.asked) == 2
+
+
+def test_no_repetition_is_offered_that_is_not_made(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    step = WeighingStep(2, 400.0)
+    case.on(step, *[case.hanging(0.0)] * MOST_REPEATS)
+    assert "doubt" in case.run()[step.key]
+    assert [GO_ON in offered for offered in case.operator.offered] == [True, True, False]
+
+    def swing(held: Any) -> None:
+        raise MovedError("the joint swings by 0.20 degrees")
+
+    monkeypatch.setattr(ScriptedJoint, "read", swing)
+    case.folder, case.operator.asked = case.folder / "again", []
+    assert all(entry["skipped"] for entry in case.run().values())
+    assert len(case.operator.asked) == len(steps_of(PLAN)) * (MOST_REPEATS - 1)
