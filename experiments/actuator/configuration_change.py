@@ -75,4 +75,5 @@ def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, 
         done = change_file(path, read_text(path), changes, agrees)
     except FileChangeError as problem:
         return f"nothing was applied: {problem}: the measurements are saved", Ending.REFUSED
-    return done + SET_DRIVES * is_written, Ending.DONE
+    has_constant = any(name == "torque_constant_nm_a" for *_, name in changes)
+    return done + SET_DRIVES * (is_written and has_constant), Ending.DONE

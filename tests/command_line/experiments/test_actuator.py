@@ -154,7 +154,10 @@ def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, 
     assert uncertain is not None and good is not None
     assert "needs no change" in apply_fit(path, uncertain, make_session(tmp_path, reported))[0]
     assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
-    assert "is changed" in apply_fit(path, good, make_session(tmp_path, reported))[0]
+    sign_alone = apply_changes(path, {("drive", "left_sweep", "sign"): -1}, make_session(tmp_path, reported))[0]
+    assert "is changed" in sign_alone and "own constants" not in sign_alone
+    done = apply_fit(path, good, make_session(tmp_path, reported))[0]
+    assert "is changed" in done and "set the drives' own constants" in done
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
