@@ -6,12 +6,13 @@ groups of their own, `walk 15.6N`, because a walking robot does not repeat a str
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from filecmp import cmp
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
+from experiments.reports.mud_names import mud_key
 from experiments.study.option import OptionError
 from firmware_host.log.log_folder import SEGMENT
 
@@ -70,6 +71,12 @@ def matches(name: str, pattern: str) -> bool:
     """Match a file name with its ending or without it."""
     stem = next((name.removesuffix(ending) for ending in (".csv.gz", *ENDINGS) if name.endswith(ending)), name)
     return fnmatchcase(name, pattern) or fnmatchcase(stem, pattern)
+
+
+def groups_of(logs: Iterable[tuple[str, str]], rules: Sequence[GroupRule]) -> list[str | None]:
+    """Return the group of each log by its file name and its own mud, as the first log spells that."""
+    spelled: dict[str, str] = {}
+    return [group_of(name, rules, spelled.setdefault(mud_key(mud), mud)) for name, mud in logs]
 
 
 def group_of(name: str, rules: Sequence[GroupRule], mud: str = "") -> str | None:

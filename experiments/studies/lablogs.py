@@ -12,7 +12,7 @@ from typing import Annotated
 
 from experiments.lablogs import plots
 from experiments.lablogs.estimates import EvaluatedLog, Refusal, join_estimates, read_log
-from experiments.lablogs.log_choice import GroupRule, Paths, find_logs, group_of, matches, parse_rule
+from experiments.lablogs.log_choice import GroupRule, Paths, find_logs, groups_of, matches, parse_rule
 from experiments.lablogs.report import DEFINITIONS, summary_of, tables_of
 from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result
@@ -74,7 +74,7 @@ def study(
     measured = [each for each in read if isinstance(each, EvaluatedLog)]
     if air:
         measured = [log._replace(in_mud=not any(matches(log.name, each) for each in air)) for log in measured]
-    groups = [group_of(log.name, group, log.mud) for log in measured]
+    groups = groups_of([(log.name, log.mud) for log in measured], group)
     estimates = join_estimates(measured, groups)
     summary = summary_of(measured, groups, estimates, refused)
     return Result(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.lablogs.log_choice import GroupRule, find_logs, group_key, group_of
+from experiments.lablogs.log_choice import GroupRule, find_logs, group_key, group_of, groups_of
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,11 @@ def test_the_first_rule_that_matches_replaces_the_label() -> None:
     ]
     assert group_of("pond.csv.gz", (GroupRule("pond", "wet"),), "A") == "wet"  # without the ending
     assert group_of("single_12.5N_1.csv", (), "A") == "A"  # which the log names
+
+
+def test_logs_of_one_mud_are_one_group_however_they_spell_it() -> None:
+    logs = [("1.mcap", "Pond"), ("2.mcap", "49.5"), ("3.mcap", "pond"), ("4.mcap", "w = 49.50 %"), ("5.csv", "")]
+    assert groups_of(logs, ()) == ["Pond", "49.5", "Pond", "49.5", None]
 
 
 def test_groups_are_in_the_order_of_strength() -> None:
