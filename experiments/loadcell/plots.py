@@ -28,7 +28,7 @@ def draw_mud(
     strokes = [trial for trial in trials if "k_p" in trial.strokes]
     for i, trial in enumerate(strokes):
         look = {"color": f"C{i}", "linewidth": 1.0}
-        _plot_insertion((vertical, depth, curve), trial, look, f"trial {i + 1}")
+        _plot_insertion((vertical, depth, curve), trial, look, f"trial {trial.recorded.number}")
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
     drags = [(trial, trial.strokes["k_s"]) for trial in trials if "k_s" in trial.strokes]
@@ -36,7 +36,7 @@ def draw_mud(
         since_s = trial.profile.times_s - stroke.begin_s
         forces_n, shown = trial.profile.forces_n - trial.profile.zero_n, since_s > -BEFORE_S
         look = {"color": f"C{i}", "linewidth": 1.0}
-        shear.plot(since_s[shown], forces_n[shown], label=f"trial {i + 1}", **look)
+        shear.plot(since_s[shown], forces_n[shown], label=f"trial {trial.recorded.number}", **look)
     if drags:
         stroke = drags[-1][1]
         steady_s = [stroke.steady_s - stroke.begin_s, stroke.end_s - stroke.begin_s]

@@ -186,7 +186,7 @@ def _truth_table(muds: Muds, truths: Mapping[str, Truth]) -> Table:
 
 
 def _trial_row(trial: AnalysedTrial) -> dict[str, Any]:
-    row: dict[str, Any] = {"trial": f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"}
+    row: dict[str, Any] = {"trial": f"{trial.recorded.kind} {trial.recorded.number}"}
     for name in COEFFICIENTS:
         estimate = trial.coefficients.get(name)
         row[name] = "" if estimate is None else coefficient_text(estimate.value, estimate.std_error)

@@ -100,6 +100,11 @@ class Recorded(NamedTuple):
     zero_n: float
     positions: StagePositions | None = None  # where an encoder measured the whole stroke
 
+    @property
+    def number(self) -> str:
+        """The number of the trial, at the end of its key; others of its kind may be left out."""
+        return self.key.rpartition("/")[2]
+
 
 class Profile(NamedTuple):
     """Force against time, with the sign at which mud resists the first motion with a positive force."""

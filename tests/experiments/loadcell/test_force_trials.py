@@ -17,6 +17,7 @@ from experiments.loadcell.analysis import (
     speed_remark,
 )
 from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.plots import draw_mud
 from experiments.loadcell.strokes import (
     INSERTION,
     SHEAR,
@@ -135,6 +136,18 @@ def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Reco
     straight = analyse_trial(insertion)
     assert turned.profile.turned
     assert turned.coefficients == {name: pytest.approx(reported) for name, reported in straight.coefficients.items()}
+
+
+def test_a_picture_names_each_trial_by_its_own_number(insertion: Recorded) -> None:
+    """The first two trials were left out."""
+    trials = [
+        analyse_trial(each._replace(key=f"mud/{each.kind}/3"))
+        for each in (insertion, feel(LawfulMud(**KNOWN), SHEAR, 8))
+    ]
+    coefficients = {name: gather_trials(trials, name, 0.0) for name in COEFFICIENTS}
+    panels = draw_mud(trials, coefficients, SETTINGS).axes
+    for panel in panels[:2]:
+        assert panel.get_legend_handles_labels()[1] == ["trial 3", "model"]
 
 
 def test_a_stage_slower_than_its_setting_is_measured_and_reported() -> None:
