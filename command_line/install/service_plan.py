@@ -123,7 +123,8 @@ def plan_installation(system: System, folder: Path | None = None) -> Plan:
         _plan_file(plan, system.root / path, text, before.get(path))
     for link in LINKS:
         _plan_link(plan, system, link)
-    changed = {path for path in after if before.get(path) != after[path]}
+    written = {step.path for step in plan.steps if isinstance(step, WriteFile)}  # also one that was deleted
+    changed = {path for path in after if before.get(path) != after[path] or system.root / path in written}
     plan.steps.extend(_commands(system, changed))
     if before != after:
         plan.steps.append(WriteFile(system.root / MANIFEST, json.dumps(after, indent=1) + "\n"))

@@ -284,6 +284,12 @@ def test_the_service_for_viewers_is_reloaded_when_it_changes_and_ended_when_it_g
     assert commands(plan_installation(machine.system())) == ["systemctl daemon-reload"]
 
 
+def test_a_file_that_was_deleted_is_written_and_loaded_again(machine: Machine) -> None:
+    machine.install()
+    (machine.root / LIVE_UNIT).unlink()
+    assert commands(plan_installation(machine.system())) == ["systemctl daemon-reload"]
+
+
 def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None:
     machine.install()
     (machine.root / MANIFEST).write_text("[1, 2", encoding="utf-8")
