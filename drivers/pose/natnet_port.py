@@ -1,7 +1,8 @@
 """The body's pose from motion capture: extrapolates the positions that a stream of them brings to the present tick.
 
 The stream is the bridge's process (natnet_bridge.py); tests pass a client in this process. After a long gap or a jump
-the first position is accepted only when a second one follows, because lost capture shows old positions.
+the first position is accepted only when a second one follows, because lost capture shows old positions. A read with a
+position that is not accepted has no pose, so that no stroke counts a jump as motion.
 """
 
 from collections.abc import Iterable
@@ -35,14 +36,14 @@ class NatNetPort:
         self._now_s = self._stamp_s = self._seen_s = self._accepted_s = NEVER_S
 
     def read(self, now_s: float) -> BodyPose:
-        self._now_s = now_s
+        self._now_s, refused = now_s, self._refused
         for stamp_s, position_m in self._stream.receive(now_s):
             follows = self._forecast.add(stamp_s, position_m) and now_s - self._seen_s <= LONGEST_GAP_S
             self._stamp_s, self._seen_s = stamp_s, now_s
             self._accepted_s = now_s if follows else NEVER_S
             self.poses += follows
             self._refused += not follows
-        if now_s - self._accepted_s > STALE_S:
+        if self._refused > refused or now_s - self._accepted_s > STALE_S:
             return BodyPose()
         return BodyPose(self._stamp_s, self._forecast.at(now_s) - self._origin_m)
 

@@ -227,6 +227,16 @@ def test_a_pose_after_a_gap_or_a_jump_is_accepted_when_a_second_one_follows(open
     assert reported[0][0] >= 1.5 + FRAME_S
 
 
+def test_a_jump_leaves_a_read_without_a_pose_though_the_next_position_arrives_with_it(open_laboratory: Open) -> None:
+    lab = open_laboratory([pose._replace(position_m=(0.1, 0.2, 1.0 + pose.time_s)) for pose in moving(0.5)])
+    lab.run(0.6)
+    for time_s, x_m in ((0.6, 0.1), (0.61, 0.1), (0.62, 0.5), (0.621, 0.5), (0.63, 0.5)):
+        lab.server.add(RecordedPose(time_s, (x_m, 0.2, 2.0 + time_s)))
+    seen = [lab.port.read(now_s) for now_s in (0.611, 0.622, 0.631) if lab.server.step(now_s)]
+    assert [round(body.x_m, 6) for body in seen if isfinite(body.x_m)] == [0.1, 0.5]
+    assert not isfinite(seen[1].x_m)
+
+
 def test_malformed_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(0.5))
     assert known(lab.run(0.4))
