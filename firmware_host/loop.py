@@ -140,6 +140,8 @@ class Loop:
             present.append(self.controller.fault)
         clearing = tick.now_s <= self._clearing_until_s
         self.faults.update(present, self.mode in ENERGISED, clearing, 1 + tick.missed)
+        if any([fault.kind.latches_idle for fault in self.faults.begun]):
+            self._clearing_until_s = NEVER_S  # the request to clear came before them
         self.events.report_faults(tick.now_s, self.faults.begun, self.faults.over)
         return Health(
             drives_heard=self.mode is not Mode.BOOT or self.drives.heard,

@@ -195,6 +195,18 @@ def test_an_input_that_says_that_the_power_is_cut_idles_the_drives(at: Copied) -
     after_release(robot)
 
 
+def test_a_clear_before_a_cut_of_the_power_does_not_clear_the_cut(at: Copied) -> None:
+    """A request to clear lasts for half a second, and a cut may be as short."""
+    robot, pressed = at("idle"), [False]
+    robot.loop.power_switch = PowerSwitch(lambda: pressed[0], "line 17 of /dev/gpiochip0")
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
+    robot.run_for(0.05)
+    pressed[0] = True
+    ticks_until(robot, "power_cut", 10)
+    pressed[0] = False
+    after_release(robot)
+
+
 def test_a_drive_may_say_that_the_power_is_cut(configuration: Configuration) -> None:
     robot = Robot(replace(configuration, emergency_stop=EmergencyStopParameters("drives")))
     robot.run_for(2.0)
