@@ -12,6 +12,7 @@ import tomlkit
 from command_line.drives.joint_setup import JointSetup
 from drivers.bench.drive_setup import same
 from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
+from firmware_host.log.log_folder import synchronise_folder
 from logs.files.whole_files import whole_file
 
 HEAD = "Settings of the drives, written by 'mudskipper drives setup' at {}. Restore the old ones with --restore."
@@ -47,6 +48,7 @@ def write_backup(path: Path, setups: list[JointSetup], changes: Mapping[str, Map
         file.write(tomlkit.dumps(document))
         file.flush()
         os.fsync(file.fileno())
+    synchronise_folder(path.parent)  # which has its new name
 
 
 def _drive_table(setup: JointSetup, new: Mapping[str, float]) -> dict[str, Any]:
@@ -65,11 +67,13 @@ def read_backup(path: Path) -> dict[str, Backup]:
     """Return the settings by joint. Raises ConfigurationError."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
-        return {joint: _backup(each) for joint, each in document.items()}
+        if document:
+            return {joint: _backup(each) for joint, each in document.items()}
     except OSError as problem:
         raise UnreadableFileError([f"{path}: {problem.strerror}"]) from None
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise ConfigurationError([f"{path}: is no file of 'mudskipper drives setup --write'"]) from None
+        pass
+    raise ConfigurationError([f"{path}: is no file of 'mudskipper drives setup --write'"])
 
 
 def _backup(table: Mapping[str, Any]) -> Backup:

@@ -1,5 +1,6 @@
 """`mudskipper drives setup` compares, writes, backs up and restores, and refuses drives that are not as configured."""
 
+import os
 import signal
 import tomllib
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.drives.backup_file import write_backup
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import load_configuration
@@ -144,12 +146,21 @@ def test_a_file_of_another_drive_is_not_restored(folder: Path, monkeypatch: pyte
     assert ended.returncode == exit_codes.UNHEALTHY and "serial number" in ended.stderr
 
 
+def test_a_backup_is_on_the_disk_under_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, synchronised = tmp_path / "old.toml", []
+    target = "/proc/self/fd/{}".format
+    monkeypatch.setattr(os, "fsync", lambda file: synchronised.append((os.readlink(target(file)), path.exists())))
+    write_backup(path, [], {})
+    assert synchronised == [(str(tmp_path / ".old.toml"), False), (str(tmp_path), True)]
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
         ("setup --endpoints bad.json", "no JSON"),
         ("setup --endpoints other.json", "no flat_endpoints.json"),
         ("setup --restore other.json", "other.json"),
+        ("setup --restore empty.toml", "empty.toml"),
     ],
 )
 def test_a_wrong_argument_is_refused_before_anything_is_written(
@@ -158,6 +169,7 @@ def test_a_wrong_argument_is_refused_before_anything_is_written(
     bench = make_bench(folder, monkeypatch, "odrive")
     (folder / "bad.json").write_text("{", encoding="utf-8")
     (folder / "other.json").write_text('{"a": 1}', encoding="utf-8")
+    (folder / "empty.toml").touch()
     command, *others = arguments.split()
     ended = run("drives", command, "--config", str(bench.config), *others)
     assert ended.returncode == exit_codes.CONFIGURATION and named in ended.stderr and "Traceback" not in ended.stderr
