@@ -106,7 +106,7 @@ class DaemonWalk:
         self._client.stride(depth_m, **gait)
 
     def walk_stride(self) -> Stride:
-        """Wait for the end of the stride; the time since the last one counts too."""
+        """Wait for the end of the stride; the time since the last one counts too, with the power at its end."""
         first = last = self._before
         work_j = [0.0] * len(first["drives"])
         while last["strides_closed"] == first["strides_closed"] and last["mode"] == "walking":
