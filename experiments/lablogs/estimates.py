@@ -17,6 +17,7 @@ from pandas import DataFrame
 
 from control.records import COEFFICIENTS, Estimate, StrideEstimate
 from estimation.estimation_parameters import Method
+from experiments.lablogs.log_choice import matches
 from experiments.lablogs.recording import Recording, read_recording
 from experiments.reports.depth_law import re_entered
 from firmware_host.configuration.configuration import CaptureAxis
@@ -54,13 +55,19 @@ class Refusal(NamedTuple):
 
 
 def read_log(
-    paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS, surface_error_m: float | None = None
+    paths: Sequence[Path],
+    vertical: CaptureAxis = VERTICAL_AXIS,
+    surface_error_m: float | None = None,
+    air: Sequence[str] = (),
 ) -> EvaluatedLog | Refusal:
-    """Read one log and replay it by every method. Without mud there is nothing to disturb."""
+    """Read one log and replay it by every method. Without mud there is nothing to disturb.
+
+    `air`: patterns of the names of all logs without mud, which is detected where none is given.
+    """
     name = paths[0].name
     try:
         recording = read_recording(paths, vertical, surface_error_m)
-        in_mud = recording.has_evidence_of_mud()
+        in_mud = not any(matches(name, each) for each in air) if air else recording.has_evidence_of_mud()
         frames = [
             estimate_rows(run.estimate_strides(method), method=method, disturbance=disturbance, seed=seed)
             for disturbance, seed, run in _runs(name, recording, in_mud)

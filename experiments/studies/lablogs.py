@@ -68,12 +68,10 @@ def study(
     """
     surface_error_m = None if surface_error is None else surface_error / 1000.0
     logs = _logs_in(folders, [*(rule.pattern for rule in group), *air])
-    read_one = partial(read_log, vertical=vertical, surface_error_m=surface_error_m)
+    read_one = partial(read_log, vertical=vertical, surface_error_m=surface_error_m, air=air)
     read = trials.compute([partial(read_one, paths) for paths in logs])
     refused = [each for each in read if isinstance(each, Refusal)]
     measured = [each for each in read if isinstance(each, EvaluatedLog)]
-    if air:
-        measured = [log._replace(in_mud=not any(matches(log.name, each) for each in air)) for log in measured]
     groups = groups_of([(log.name, log.mud) for log in measured], group)
     estimates = join_estimates(measured, groups)
     summary = summary_of(measured, groups, estimates, refused)

@@ -104,3 +104,13 @@ def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(two_walks: Path)
     assert {len(each) for each in starts_s.values()} == {3 * len(strides)}
     values = log.estimates.groupby("disturbance")["value"].sum()
     assert len(set(values)) == 4  # each disturbance moves some
+
+
+@pytest.mark.parametrize(("air", "in_mud"), [("two*", False), ("other*", True)])
+def test_a_log_that_is_not_named_as_air_is_disturbed_whatever_its_torques(
+    air: str, in_mud: bool, two_walks: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording_module.Recording, "has_evidence_of_mud", lambda recording: not in_mud)
+    log = read_log([two_walks], air=[air])
+    assert isinstance(log, EvaluatedLog)
+    assert (log.in_mud, log.estimates["disturbance"].nunique()) == (in_mud, 4 if in_mud else 1)
