@@ -15,6 +15,7 @@ from typing import NamedTuple
 from experiments.reports.mud_names import mud_key
 from experiments.study.option import OptionError
 from firmware_host.log.log_folder import SEGMENT
+from logs.files.whole_files import is_hidden
 
 ENDINGS = (".csv", ".csv.gz", ".mcap")
 LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
@@ -44,7 +45,8 @@ def find_logs(folders: Sequence[Path]) -> list[Paths]:
     """
     found: dict[Path, Path] = {}
     for folder in folders:
-        files = sorted(folder.rglob("*")) if folder.is_dir() else [folder]
+        below = [each for each in sorted(folder.rglob("*")) if not is_hidden(each, folder)]
+        files = below if folder.is_dir() else [folder]
         found |= {path.resolve(): path for path in files if path.is_file() and path.name.endswith(ENDINGS)}
     paths: list[Path] = []
     for path in sorted(found.values(), key=lambda each: len(each.parts)):  # of two copies the one higher up stays

@@ -35,7 +35,7 @@ from logs.catalogue.entry import (
     stamp_of_entry,
 )
 from logs.files.log_error import LogError, Watch
-from logs.files.whole_files import hidden_path, whole_file
+from logs.files.whole_files import hidden_path, is_hidden, whole_file
 
 NAME = "catalogue.parquet"
 VERSION = 2  # of COLUMNS; an older catalogue is made again
@@ -66,7 +66,8 @@ def catalogue_path(folder: Path) -> Path:
 
 def closed_logs(folder: Path) -> list[Path]:
     """Return all logs below the folder whose writer is done, oldest first."""
-    return sorted((path for path in folder.rglob(f"*{ENDING}") if path.parent.name != ACTIVE), key=age_of)
+    paths = (path for path in folder.rglob(f"*{ENDING}") if not is_hidden(path, folder))
+    return sorted((path for path in paths if path.parent.name != ACTIVE), key=age_of)
 
 
 class Catalogue:

@@ -14,6 +14,11 @@ def hidden_path(path: Path) -> Path:
     return path if path.exists() and not path.is_file() else path.with_name(f".{path.name}")
 
 
+def is_hidden(path: Path, folder: Path) -> bool:
+    """Return whether a file below a folder is not whole yet, such as one that `log pull` still copies."""
+    return "/." in f"/{path.relative_to(folder).as_posix()}"
+
+
 @contextmanager
 def whole_files(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """Yield paths with the same endings to write to; rename all where nothing was raised. Raises OSError."""

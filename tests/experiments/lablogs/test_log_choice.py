@@ -68,3 +68,10 @@ def test_a_copy_in_the_folder_of_a_report_is_no_repetition_and_another_log_of_th
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "one.csv").write_text(text, encoding="utf-8")
     assert find_logs([tmp_path]) == [(tmp_path / "one.csv",), (tmp_path / "other" / "one.csv",)]
+
+
+def test_a_log_that_is_still_being_copied_is_no_repetition(tmp_path: Path) -> None:
+    (tmp_path / "done" / ".partial").mkdir(parents=True)
+    for name in ("done/one.mcap", "done/.two.mcap", "done/.partial/three.mcap"):
+        (tmp_path / name).write_text(name, encoding="utf-8")
+    assert find_logs([tmp_path]) == [(tmp_path / "done" / "one.mcap",)]

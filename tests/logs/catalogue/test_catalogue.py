@@ -107,6 +107,13 @@ def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
     assert (entry.state, entry.run) == ("whole", "other") and entry.duration_s is not None
 
 
+def test_a_log_that_is_still_being_copied_is_no_entry(folder: Path) -> None:
+    (folder / DONE / ".partial").mkdir()
+    for name in (".partial/next.mcap", ".next.mcap"):
+        (folder / DONE / name).write_bytes(WALK.read_bytes()[:-100])
+    assert sorted(updated(folder)) == [f"{DONE}/rest.mcap", f"{DONE}/walk.mcap"]
+
+
 def test_a_broken_log_is_an_entry_with_its_reason(folder: Path) -> None:
     (folder / DONE / "cut.mcap").write_bytes(WALK.read_bytes()[:-100])
     (folder / DONE / "text.mcap").write_text("no log", encoding="utf-8")
