@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 from control.records import Rig
 from estimation.estimation_parameters import Method
@@ -95,6 +96,9 @@ def replay(
     `method` and `configuration` replace those of the log. `vertical` is the axis of a CSV's capture that points up:
     "x", "y" or "z" (default: `pose.vertical` of the configuration, "y" without one).
     """
+    for name, value, known in (("method", method, get_args(Method)), ("vertical", vertical, get_args(CaptureAxis))):
+        if value not in (None, *known):
+            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(known)}")
     return replay_files(_as_paths(path), configuration, method, vertical=vertical)
 
 

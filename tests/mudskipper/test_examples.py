@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -98,6 +99,12 @@ def test_a_replay_is_that_of_the_command() -> None:
     expected = repr(replay_files([LOG]).strides)  # as text, because NaN is not equal to NaN
     assert repr(mudskipper.replay(LOG).strides) == expected
     assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
+
+
+@pytest.mark.parametrize("wrong", [{"method": "Paper"}, {"vertical": "up"}])
+def test_a_method_or_an_axis_that_does_not_exist_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="must be one of"):
+        mudskipper.replay(LOG, **wrong)
 
 
 def test_forces_are_plotted(tmp_path: Path) -> None:
