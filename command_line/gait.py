@@ -53,7 +53,9 @@ def check(
     if problems := [*depths, *gait_problems(path, configuration, depth_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
-    print("\nthe crutching gait: its depth can adapt to the mud" if crutching_parameters(path) else "\naccepted")
+    needs_depth = f" at {100.0 * depth_m:g} cm: without depths_m it needs --depth to walk" * (not path.depths_m)
+    is_crutching = crutching_parameters(path)
+    print("\nthe crutching gait: its depth can adapt to the mud" if is_crutching else f"\naccepted{needs_depth}")
     if out:
         from experiments.pictures.gait_picture import draw_gait  # matplotlib is slow to import
 

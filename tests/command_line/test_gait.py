@@ -70,3 +70,11 @@ def test_a_robot_on_a_fixed_base_does_not_advance(tmp_path: Path) -> None:
     assert run("init", robot, "--defaults", "--base", "fixed").returncode == exit_codes.OK
     found = run("gait", "simulate", "walking", "--mud", "48.5", "--strides", "1", "--config", robot)
     assert found.returncode == exit_codes.OK and "0.0 cm in" in found.stdout
+
+
+def test_a_path_without_depths_is_accepted_for_a_walk_that_gives_one(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(STANCE + SWING, encoding="utf-8")
+    checked, walked = run("gait", "check", str(path)), run("gait", "simulate", str(path))
+    assert checked.returncode == exit_codes.OK and "needs --depth" in checked.stdout
+    assert walked.returncode == exit_codes.CONFIGURATION and "depths_m is missing" in walked.stderr
