@@ -1,9 +1,9 @@
 """Identifies what computed a result: the version, and a digest of all sources that its study imports.
 
-Equal sources give equal digits; equal version numbers need not. The digest is the same for a checkout and for an
-installed wheel of the same sources, and a change of the documentation, of a test or of another study does not change
-it. Imports are found in the text of the modules, also those within functions; a module that is imported by a computed
-name is not found.
+Equal sources, which include the gaits that ship, give equal digits; equal version numbers need not. The digest is the
+same for a checkout and for an installed wheel of the same sources, and a change of the documentation, of a test or of
+another study does not change it. Imports are found in the text of the modules, also those within functions; a module
+that is imported by a computed name is not found.
 """
 
 import ast
@@ -22,6 +22,7 @@ PACKAGES = (
     "command_line", "control", "drivers", "estimation", "experiments", "firmware_host", "logs", "mudskipper",
     "operator_client", "simulation", "verification",
 )  # fmt: skip
+FILES = {"firmware_host.configuration.gait_file": "firmware_host/configuration/gaits/*.toml"}  # that a module reads
 DIGITS = 16
 Record = dict[str, str]
 
@@ -55,6 +56,8 @@ def source_digest(*modules: str) -> str:
         module = left.pop()
         if module not in texts and (text := _text_of(module)) is not None:
             texts[module] = text
+            files = ROOT.glob(FILES[module]) if module in FILES else ()
+            texts |= {file.name: file.read_bytes() for file in files}
             left += [module.rpartition(".")[0], *_imports(module)]
     if unknown := set(modules) - set(texts):
         raise ValueError(f"{', '.join(sorted(unknown))}: no module of {PACKAGE}")

@@ -42,6 +42,13 @@ def test_another_location_has_the_same_digest_and_a_changed_constant_another_one
     assert digest_of(copy) != here
 
 
+def test_a_gait_that_ships_counts(copy: Path) -> None:
+    before = digest_of(copy)
+    with (copy / "firmware_host" / "configuration" / "gaits" / "measuring.toml").open("a") as gait:
+        gait.write("# another\n")
+    assert digest_of(copy) != before
+
+
 def test_an_import_within_a_function_counts(copy: Path) -> None:
     before = digest_of(copy, "command_line.experiments.studies")
     with (copy / "experiments/study/cluster_workers.py").open("a") as module:
