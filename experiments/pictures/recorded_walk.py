@@ -74,6 +74,7 @@ class RecordedWalk(NamedTuple):
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
     series: Mapping[str, Mapping[str, Any]] = {}  # of every flipper that moved, the left one first
+    fixed_base: bool = False  # the body cannot advance
     source: TraceSource | None = None  # of a walk that has not every row of the log
 
     @property
@@ -82,9 +83,14 @@ class RecordedWalk(NamedTuple):
         return [self._replace(flipper=flipper, **series) for flipper, series in self.series.items()] or [self]
 
     @property
+    def reach_m(self) -> float:
+        """How far in front of the body the plates go down: l sin α."""
+        return self.geometry.flipper_length_m * sin(self.sweep_rad)
+
+    @property
     def geometric_step_m(self) -> float:
-        """The step with a plate that does not move in the mud during the sweep: 2 l sin α."""
-        return 2.0 * self.geometry.flipper_length_m * sin(self.sweep_rad)
+        """The step with a plate that does not move in the mud during the sweep: 2 l sin α; NaN on a fixed base."""
+        return nan if self.fixed_base else 2.0 * self.reach_m
 
     @property
     def own_strides(self) -> list[dict[str, Any]]:
@@ -146,6 +152,7 @@ def walk_of_trace(log: AnyLog, configuration: Configuration, traces: WalkTraces,
         walks=len(traces.walks),
         begun_s=trace.start_s - begin_s(log),
         complete=log.complete,
+        fixed_base=configuration.estimation.fixed_base,
         cut=_cut_of(log, trace.first_row == 0, trace.end_row == log.rows),
         source=TraceSource(log, trace.rows, trace.start_s) if traces.bin_ticks else None,
     )

@@ -32,7 +32,7 @@ class Outcome(StrEnum):
     SLIPPING = "slipping"
     STUCK = "stuck"
     GOOD = "good"
-    UNKNOWN = "unknown"  # its length is not known without a pose
+    UNKNOWN = "unknown"  # its length is not known without a pose, and says nothing on a fixed base
 
     @property
     def of_stride(self) -> str:

@@ -215,10 +215,10 @@ def estimate_frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
 def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudRegion], row: Stride) -> str:
     if layout is None:
         return next((each.name for each in reversed(regions) if each.start_s <= row["t_start_s"]), "")
-    if len(layout.names) == 1 and not isfinite(row["position_m"] + walk.geometric_step_m):
+    if len(layout.names) == 1 and not isfinite(row["position_m"] + walk.reach_m):
         return mud_label(layout.names[0])
-    slip_m = max(0.0, walk.geometric_step_m - row["step_m"])
-    return mud_label(layout.mud_at(row["position_m"] + walk.geometric_step_m / 2.0, slip_m))
+    slip_m = max(0.0, 2.0 * walk.reach_m - row["step_m"])
+    return mud_label(layout.mud_at(row["position_m"] + walk.reach_m, slip_m))
 
 
 def estimate_of_row(row: Stride, name: str) -> dict[str, Any]:

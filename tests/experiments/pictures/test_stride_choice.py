@@ -76,6 +76,12 @@ def test_a_stride_fails_below_half_of_the_geometric_step_or_where_the_flipper_st
     assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
 
 
+@pytest.mark.parametrize(("released", "outcome"), [(True, Outcome.UNKNOWN), (False, Outcome.STUCK)])
+def test_on_a_fixed_base_no_stride_slips(released: bool, outcome: Outcome) -> None:
+    walk = walk_of([stride_row(0, 0.0, released)])._replace(fixed_base=True)
+    assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
+
+
 def test_the_clearest_stride_of_each_outcome_is_chosen() -> None:
     steps = [(0.11, True), (0.05, True), (0.02, False), (0.01, True), (-0.03, False), (0.13, True)]
     walk = walk_of([stride_row(index, *step) for index, step in enumerate(steps)])
