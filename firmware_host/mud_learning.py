@@ -6,7 +6,7 @@ of the next stride is chosen.
 
 The fits at the end of an insertion, and the close of a stride with its choice, take longer than a tick. They are
 bounded work (control/computing/bounded_work.py), of which the loop runs one unit a tick after the command of that tick.
-So an insertion is fitted some 20 ticks after its end, and a stride closes some 30 ticks after its swing began (40 with
+So an insertion is fitted 21 to 31 ticks after its end, and a stride closes some 30 ticks after its swing began (40 with
 the method `gait`). Where a swing is too short for that, all units left run at once before the next insertion begins; a
 choice that still comes later, because the mud held a flipper, is logged as late. A new walk finishes the strides of the
 one before.

@@ -29,7 +29,7 @@ from control.parameters.adaptation_parameters import AdaptationParameters, GaitA
 from control.parameters.gait_parameters import GaitParameters
 from control.records import StrideEstimate
 
-SWEEP_STEP_DEG = 5.0  # 8 mm of step
+SWEEP_STEP_DEG = 5.0  # 14 to 18 mm of step
 EASY_FRACTION = 0.7  # of the lifting torque: an extraction below it allows a wider sweep
 WIDENING_DEG = 10.0  # from one stride to the next
 

@@ -24,7 +24,7 @@ INTERVAL_S = 0.1
 SURE_ERRORS = 3.0  # standard errors of the slope: messages that repeat old values scatter it
 LEAK_S = 5.0
 SLIPPED_RAD = 0.125
-LEAST_RAD2 = 0.05  # variance of W that determines the slope: four intervals at 1 rad/s in each direction
+LEAST_RAD2 = 0.05  # variance of W that determines the slope: three intervals at 1 rad/s in each direction
 WRONG_INTERVALS = 5  # in a row: one interval of a slip bends the line as well, until it is found
 WRONG_FRACTION = 0.035  # of the slope: below the 5 % that must be found, and above what late messages cause
 
