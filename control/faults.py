@@ -429,7 +429,7 @@ class FaultKind(StrEnum):
         "estimate_wild", "estimator", WARN, NO, WHEN_GONE, 60,
         "An estimated coefficient is beyond what any mud has.",
         "Stride {stride} of the {subject} flipper gave a coefficient beyond what any mud has.",
-        "look at the strides in the log; the next depth is the first one of the walk",
+        "look at the strides in the log; the estimate of the mud leaves it out",
     )
     POSE_LOST = (
         "pose_lost", "pose", WARN, NO, WHEN_GONE, 22,
