@@ -1,13 +1,13 @@
 """The mud's shear resistance from one stance: the value of k_s, or a lower bound.
 
-The plate's pressure is k_s ζ only where the mud yields. Because the flippers can move the body, there are three cases
-(section III-C of the paper), distinguished batch by batch by the plate's slip, its path back through the mud:
+The plate's pressure is k_s ζ only where the mud yields. Because the flippers can move the body, there are four cases
+(three in section III-C of the paper), distinguished batch by batch by the plate's slip, its path back through the mud:
 
     yield             the body stands, the plate shears through the mud: τ₁ = k_s Ψ
     limited_by_body   the body advances and the mud does not yield: the force is the body's drag, a lower bound of k_s
     mixed             the plate slips while the body advances: k_s from the batches that slip
-    limited_by_motor  a motor at its limit for more than CLIPPED of the stance sets the force, however the plate creeps:
-                      a lower bound of k_s
+    limited_by_motor  a motor at its limit for more than CLIPPED of the stance sets the force, however the plate creeps,
+                      and for any batch a stance in which the mud does not yield: a lower bound of k_s
 
 A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. With a fixed
 base all travel is slip. Without a pose the size of the force decides: while both flippers together push less than the
