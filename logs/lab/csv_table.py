@@ -105,7 +105,8 @@ def _find_names(path: Path, lines: list[str]) -> int:
 
 def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], list[Finding]]:
     """Return the settings that are numbers, the names without one, and what is reported about them."""
-    names, values = _split_settings([line for line in head if line.strip()])
+    filled = (line.rstrip(", ") for line in head)  # a spreadsheet makes lines equally long by commas
+    names, values = _split_settings([line for line in filled if line])
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
         missing = _without_texts(names)

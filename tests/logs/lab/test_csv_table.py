@@ -34,6 +34,7 @@ HEADS = {
     "published": (NAMES, VALUES),
     "joined": (f"# gait header: {NAMES} | {VALUES}",),
     "with an empty line": (NAMES, VALUES, ""),
+    "made as long as the rows by a spreadsheet": (f"{NAMES},", f"{VALUES},", ",,,,"),
 }
 
 
@@ -48,9 +49,10 @@ def test_settings_and_rows_are_read_under_every_head(head: tuple[str, ...], tmp_
     assert table.line.tolist() == [len(head) + 2 + number for number in range(6)]
 
 
-def test_more_names_than_values_leave_every_setting_unknown(tmp_path: Path) -> None:
+@pytest.mark.parametrize("values", [VALUES, f"{VALUES},"])
+def test_more_names_than_values_leave_every_setting_unknown(values: str, tmp_path: Path) -> None:
     """Otherwise the value of one setting would be read under the name of another."""
-    table = read_table(write(tmp_path / "run.csv", NAMES + ",wiggle_amplitude", VALUES, COLUMNS, *ROWS), WANTED)
+    table = read_table(write(tmp_path / "run.csv", NAMES + ",wiggle_amplitude", values, COLUMNS, *ROWS), WANTED)
     assert table.gait == {}
     assert table.missing_settings == ("lateral_angle_range", "insertion_angle", "wiggle_amplitude")
     assert [finding.kind for finding in table.findings] == [FindingKind.MISSING_SETTING]
