@@ -4,6 +4,7 @@ Hands and tiny torques use the buses in this process, as the bench does. Weights
 not let go while a disk or a terminal stalls, so they use a daemon, which this program starts on the same buses.
 """
 
+import os
 import subprocess
 import sys
 import time
@@ -74,7 +75,7 @@ class CalibratedRobot:
 @contextmanager
 def running_daemon(configuration: Configuration, folder: Path) -> Iterator[Path]:
     """Run a daemon with this configuration, and yield its socket. Raises BenchError where it does not start."""
-    socket = named_folder("calibration") / "mudskipper.sock"
+    socket = named_folder("calibration") / f"{os.getpid()}.sock"  # of this robot, where a user calibrates two
     paths: Changes = {("status", "socket"): str(socket), ("log", "directory"): str((folder / "logs").absolute())}
     path, messages = folder / FILE, folder / "mudskipperd.txt"
     path.write_text(changed_text(configuration.text, paths), encoding="utf-8")

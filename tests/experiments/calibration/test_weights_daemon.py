@@ -1,10 +1,14 @@
 """The weighing of a real robot has a daemon of its own, in real time."""
 
+import os
 from pathlib import Path
+
+import pytest
 
 from experiments.calibration.robots import running_daemon
 from firmware_host.configuration.loading import parse_configuration
 from operator_client.status_client import StatusClient
+from simulation.harness.local_setup import write_local_setup
 from tests.running_bench import Bench
 
 
@@ -16,3 +20,17 @@ def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Pa
     assert not socket.exists()
     own_bench.restart_daemon()
     own_bench.wait_until_ready()
+
+
+def test_two_robots_of_one_user_have_a_daemon_each(
+    short_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robots = []
+    for name in ("first", "second"):
+        (short_folder / name).mkdir()
+        text = write_local_setup(short_folder / name, tmp_path).read_text(encoding="utf-8")
+        robots.append(parse_configuration(text.replace('name = "simulated"', f'name = "{name}"')))
+    with running_daemon(robots[0], short_folder / "first"):
+        monkeypatch.setattr(os, "getpid", lambda: 0)  # as of another program
+        with running_daemon(robots[1], short_folder / "second") as socket, StatusClient(socket) as client:
+            assert client.call("status")["robot"] == "second"
