@@ -128,13 +128,13 @@ def _conduct(name: str, options: argparse.Namespace, module: ModuleType) -> int:
     before = count_entries(results) if (results / files.page).exists() else None
     try:
         status = _run(name, options, module, partial(function, **values), results, program, typed)
+        if before == count_entries(results):
+            print(f"{results} had every measurement already; they are only evaluated again", file=sys.stderr)
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
         status = _end_early(results, problem)
     finally:
         if is_new:
             remove_unused(results)
-    if before == count_entries(results):
-        print(f"{results} had every measurement already; they are only evaluated again", file=sys.stderr)
     return status
 
 

@@ -225,6 +225,17 @@ def test_a_finished_experiment_is_refused_and_with_more_trials_it_continues(
     assert conduct_with(3) == exit_codes.OK and calls == [0, 1, 2]
 
 
+def test_only_an_experiment_that_ends_says_that_nothing_was_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ends(session: Session) -> Result:
+        raise EndedError("the operator ends")
+
+    for run, trials, said in ((measured_by(2, []), 2, False), (ends, 3, False), (measured_by(1, []), 1, True)):
+        conduct(options(tmp_path, trials=trials), run)
+        assert ("had every measurement already" in capsys.readouterr().err) is said
+
+
 def test_another_version_and_other_sources_are_refused_and_the_same_continue(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
