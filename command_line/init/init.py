@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import fields
 from math import isfinite
 from pathlib import Path
@@ -133,11 +133,12 @@ def unasked(prompt: str, default: T, parse: Callable[[str], T]) -> T:
 def asked_on_terminal(prompt: str, default: T, parse: Callable[[str], T]) -> T:
     """Show the default in brackets, which an empty line takes; ask again after an answer that does not fit."""
     shown = f"{default:.10g}" if isinstance(default, float) else str(default)
-    while line := input(f"{prompt} [{shown}]: ").strip():
-        try:
-            return parse(line)
-        except (ValueError, argparse.ArgumentTypeError) as problem:
-            print(f"  {problem}")
+    with redirect_stdout(sys.stderr):  # standard output may be the file
+        while line := input(f"{prompt} [{shown}]: ").strip():
+            try:
+                return parse(line)
+            except (ValueError, argparse.ArgumentTypeError) as problem:
+                print(f"  {problem}")
     return default
 
 

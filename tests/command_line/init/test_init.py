@@ -78,7 +78,8 @@ def test_empty_answers_are_the_defaults() -> None:
 def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> None:
     lines = "mudcat middle right fixed odrive socketcan can7 63 5 6 square rectangle long 0.001 0.115"
     robot, _ = answered(lines.split())
-    printed = capsys.readouterr().out
+    written, printed = capsys.readouterr()
+    assert parse_configuration(written).robot.name == "mudcat"
     assert (robot.name, robot.rig.flippers, robot.channels) == ("mudcat", ("right",), ("can7",))
     assert robot.node_ids == {"right_sweep": 5, "right_adduction": 6}
     assert robot.geometry == FlipperGeometry(flipper_length_m=0.115)
