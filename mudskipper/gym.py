@@ -98,7 +98,7 @@ class MudWalk(gymnasium.Env[Array, Array]):
         self._walk: SimulatedWalk | DaemonWalk | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Put the robot on a new ground, arm it, and walk the first stride at 2 cm."""
+        """Put a simulated robot on a new ground, arm it, and walk the first stride: at 2 cm, unless it is adaptive."""
         super().reset(seed=seed)
         self.close()
         world, number = self._world or self._random_world(), int(self.np_random.integers(1, 2**31))
