@@ -337,7 +337,7 @@ def _gain_monitor(configuration: Configuration) -> TorqueGainMonitor:
                 configuration.geometry,
                 configuration.arm,
                 [frictions.get(joint, NO_FRICTION) for joint in joints],
-                drives[joints[0]].answers_only,
+                [drives[joint].answers_only for joint in joints],
             )
         )
     return TorqueGainMonitor(flippers)

@@ -197,12 +197,12 @@ class FlipperStrokes:
         geometry: FlipperGeometry,
         mass: ArmMass,
         frictions: Sequence[JointFriction],
-        asked: bool,
+        asked: Sequence[bool],
     ) -> None:
-        """`first`: of the flipper's joints among all. `asked`: drives that answer only when asked, a tick later."""
+        """`first`: of the flipper's joints among all. `asked`: of each, whether its drive answers only when asked."""
         self._first = self._watched = first
         self._geometry, self._mass = geometry, mass
-        self._commands = slice(0, BLOCK_TICKS) if asked else slice(1, BLOCK_TICKS + 1)
+        self._commands = [slice(0, BLOCK_TICKS) if each else slice(1, BLOCK_TICKS + 1) for each in asked]
         inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
         self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, (JOINED_BLOCKS, 1))
         self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
@@ -225,7 +225,7 @@ class FlipperStrokes:
             return
         watched = self._watched
         torque_nm = 0.0
-        for torques_nm in sent_nm[self._commands]:
+        for torques_nm in sent_nm[self._commands[watched - self._first]]:
             torque_nm += torques_nm[watched] / BLOCK_TICKS
         gravity_nm = self._mass.gravity_torques_nm(states[self._first].angle_rad, states[self._first + 1].angle_rad)
         joint.add(before, self._before, torque_nm, gravity_nm[watched - self._first])

@@ -128,6 +128,32 @@ def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only
     assert (stride.blocks.blocks, stride.joined.blocks) == (5, 0)
 
 
+def monitor_of(*asked: bool) -> TorqueGainMonitor:
+    """Return the monitor of a flipper without weight and friction."""
+    weightless = ArmMass(arm_mass_kg=0.0, sweep_inertia_kg_m2=INERTIA_KG_M2, adduction_inertia_kg_m2=INERTIA_KG_M2)
+    frictions = (NO_FRICTION, NO_FRICTION)
+    return TorqueGainMonitor(
+        [FlipperStrokes(0, ("left_sweep", "left_adduction"), FlipperGeometry(), weightless, frictions, asked)]
+    )
+
+
+@pytest.mark.parametrize("asked", [(False, False), (False, True), (True, False), (True, True)])
+def test_each_joint_of_a_flipper_has_the_commands_of_its_own_type_of_drive(asked: tuple[bool, bool]) -> None:
+    """A torque that reverses with every block has half the mean over four ticks from the one before on."""
+    monitor, found = monitor_of(*asked), list[Fault]()
+    stamp_s, speeds_rad_s, delayed = 1.0, [1.0, 1.0], [0.0, 0.0]
+    for phase in (Phase.SWING, Phase.INSERTION, Phase.STANCE):
+        for tick in range(40):
+            torque_nm = 0.02 if (tick - 1) // 4 % 2 else -0.02
+            stamp_s += PERIOD_S
+            for joint, is_asked in enumerate(asked):
+                acting_nm, delayed[joint] = (delayed[joint], torque_nm) if is_asked else (torque_nm, torque_nm)
+                speeds_rad_s[joint] += 1.2 * acting_nm / INERTIA_KG_M2 * PERIOD_S
+            sweep, adduction = (DriveState(0.5, speed_rad_s, stamp_s) for speed_rad_s in speeds_rad_s)
+            monitor.update(found, True, Joints(sweep, adduction), Joints(torque_nm, torque_nm), phase)
+    assert found == []
+
+
 @pytest.mark.parametrize(
     ("before", "counts"),
     [
@@ -140,10 +166,7 @@ def test_the_first_insertion_of_a_walk_may_be_in_mud_into_which_the_body_has_sun
     before: tuple[Phase, ...], counts: bool
 ) -> None:
     """The swing of the walk before was in air. By its angles the flipper is in air now too, by its torque it is not."""
-    weightless = ArmMass(arm_mass_kg=0.0, sweep_inertia_kg_m2=INERTIA_KG_M2, adduction_inertia_kg_m2=INERTIA_KG_M2)
-    frictions = (NO_FRICTION, NO_FRICTION)
-    flipper = FlipperStrokes(0, ("left_sweep", "left_adduction"), FlipperGeometry(), weightless, frictions, asked=False)
-    monitor, found, stamp_s, speed_rad_s = TorqueGainMonitor([flipper]), list[Fault](), 1.0, 1.0
+    monitor, found, stamp_s, speed_rad_s = monitor_of(False, False), list[Fault](), 1.0, 1.0
     for phase, gain in (*((each, 1.0) for each in before), (Phase.INSERTION, 0.2), (Phase.STANCE, 1.0)):
         for tick in range(40):
             torque_nm = 0.02 * sin(tick / 6.0)
