@@ -39,7 +39,7 @@ class FlipperDrive(NamedTuple):
     adduction_constant_nm_a: float
     sweep_friction: JointFriction = NO_FRICTION
     adduction_friction: JointFriction = NO_FRICTION
-    current_limit_a: float = float("inf")  # at which the drives clip
+    current_limit_a: float = float("inf")  # at which the sweep's drive clips
 
 
 class JointLoad(NamedTuple):

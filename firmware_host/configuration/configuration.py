@@ -163,14 +163,13 @@ class Configuration:
 
     def _flipper_drive(self, sweep: str, adduction: str) -> FlipperDrive:
         drives = (self.drive[sweep], self.drive[adduction])
-        limits_a = [min(d.current_limit_a, self.limits.torque_nm / d.torque_constant_nm_a) for d in drives]
         return FlipperDrive(
             mass=self.arm,
             sweep_constant_nm_a=drives[0].torque_constant_nm_a,
             adduction_constant_nm_a=drives[1].torque_constant_nm_a,
             sweep_friction=self.friction.get(sweep, NO_FRICTION),
             adduction_friction=self.friction.get(adduction, NO_FRICTION),
-            current_limit_a=min(limits_a),
+            current_limit_a=min(drives[0].current_limit_a, self.limits.torque_nm / drives[0].torque_constant_nm_a),
         )
 
     @property

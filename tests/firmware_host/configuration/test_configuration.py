@@ -1,6 +1,7 @@
 """A configuration is accepted as a whole, or refused with the names of the wrong keys before anything is opened."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -400,3 +401,15 @@ def test_a_reason_without_weak_protection_or_that_cannot_be_shown_is_refused(rea
     path.write_text(f'{minimal_text()}\n[safety]\nweakened = "{reason}"', encoding="utf-8")
     with pytest.raises(ConfigurationError, match="safety.weakened = .*: must be"):
         load_configuration(path)
+
+
+def test_a_stance_is_clipped_at_the_limit_of_the_sweep_motor_whatever_the_adduction_motor(
+    configuration: Configuration,
+) -> None:
+    """A larger torque constant takes less current for the torque limit."""
+    other = {
+        joint: replace(drive, torque_constant_nm_a=0.166) if joint.endswith("adduction") else drive
+        for joint, drive in configuration.drive.items()
+    }
+    limits_a = [each.current_limit_a for each in configuration.flipper_drives]
+    assert [each.current_limit_a for each in replace(configuration, drive=other).flipper_drives] == limits_a
