@@ -438,7 +438,7 @@ class FaultKind(StrEnum):
     LEASE_LOST = (
         "lease_lost", "lease", SOFT_STOP, ALWAYS, WHEN_GONE, 2,
         "The program that held the lease disconnected or did not renew it.",
-        "{holder} held the lease and did not renew it.", "make the robot safe, then arm again",
+        "{holder} held the lease, and disconnected or did not renew it.", "make the robot safe, then arm again",
     )
     # the log
     DISK_LOW = (

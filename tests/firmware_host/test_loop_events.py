@@ -33,8 +33,10 @@ def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False
 
 def test_a_change_of_mode_is_logged_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
     events.report_mode_change(1.0, **change(Mode.WALKING, Mode.STOPPING, faulty=True))
-    assert recorder.texts == ["mode walking to stopping: Anna held the lease and did not renew it."]
-    assert events.notice.startswith("stopped by lease_lost: Anna held the lease and did not renew it. ")
+    assert recorder.texts == ["mode walking to stopping: Anna held the lease, and disconnected or did not renew it."]
+    assert events.notice.startswith(
+        "stopped by lease_lost: Anna held the lease, and disconnected or did not renew it. "
+    )
 
 
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
