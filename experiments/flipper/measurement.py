@@ -51,6 +51,11 @@ def require_bench(flipper: str, configuration: Configuration) -> None:
             f"the daemon is configured for walking: set {' and '.join(missing)} in its configuration, then "
             "'systemctl restart mudskipper'"
         )
+    require_flipper(flipper, configuration)
+
+
+def require_flipper(flipper: str, configuration: Configuration) -> None:
+    """Raises BenchError for a robot without that flipper."""
     own = configuration.rig.flippers
     if flipper not in own:
         raise BenchError(f"the robot has no {flipper} flipper, rig.flippers is {list(own)}: give --flipper {own[0]}")

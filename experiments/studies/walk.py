@@ -7,6 +7,7 @@ from functools import partial
 from math import fsum
 from typing import Annotated, Literal
 
+from experiments.flipper.measurement import require_flipper
 from experiments.reports.mud_names import mud_name
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.studies.flipper import Depth, TruthFile
@@ -65,7 +66,8 @@ def study(
         muds=muds, trials=trials, depth_m=depth / 100.0, soft=softs, flipper=flipper, simulated=session.simulated
     )
     known = load_truth(truth) if truth else None
-    bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.operator, plan))
+    simulated = partial(walking_bench, session.operator, plan)
+    bench = open_bench(session, plan.identity, _instructions, simulated, partial(require_flipper, flipper))
     return result_of(plan, run_trials(bench, session, plan.planned, partial(measure, bench, plan)), known)
 
 
