@@ -1,6 +1,8 @@
 """With --json, every command that fails prints its reason as a JSON object with the same keys."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from command_line import exit_codes
 from command_line.parser import build_parser
 from tests.command_line.command_lines import run
+from tests.waiting import LONGEST_S
 
 
 @pytest.mark.parametrize(
@@ -37,6 +40,23 @@ def test_a_command_that_has_answered_adds_no_error(tmp_path: Path) -> None:
     ended = run("doctor", "--config", str(tmp_path / "bad.toml"), "--json")
     assert ended.returncode == exit_codes.UNHEALTHY
     assert isinstance(json.loads(ended.stdout), list)
+
+
+@pytest.mark.parametrize(
+    ("words", "closed", "status"),
+    [
+        ("status --socket /none --json", "2>&-", exit_codes.NO_DAEMON),  # its message would stand before the JSON
+        ("log list . --json", "2>&-", exit_codes.OK),
+        ("check --socket /none --config /none.toml", ">&-", exit_codes.UNHEALTHY),
+    ],
+)
+def test_a_closed_stream_changes_neither_the_exit_status_nor_the_other_stream(
+    words: str, closed: str, status: int, tmp_path: Path
+) -> None:
+    command = ["sh", "-c", f'exec "$0" -m command_line.main {words} {closed}', sys.executable]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, cwd=tmp_path, check=False)
+    assert (ended.returncode, ended.stderr) == (status, "")
+    assert closed == ">&-" or json.loads(ended.stdout)
 
 
 def test_an_earlier_command_leaves_no_state() -> None:
