@@ -68,7 +68,8 @@ def simulate(
 
 def _simulate_locally(folder: Path, config: Path | None, ground: peer.Ground, seed: int, named: str) -> int:
     """Simulate the robot of a configuration, or the usual one, on local buses in this folder."""
-    logs = Path("mudskipper-simulated").absolute()
+    # a folder of logs has one daemon: it keeps the descriptions of walks there
+    logs = Path("mudskipper-simulated" + f"-{folder.name}" * (folder.name != SIMULATED)).absolute()
     text = configuration_text(folder, logs)
     if config:
         text = read_text(config)

@@ -172,6 +172,9 @@ def test_a_second_simulated_robot_leaves_the_first_one_and_its_files_alone(
     locks.close()
     assert main(["simulate", "--bus", "twice"]) == exit_codes.OK
     assert "mudskipperd --config" in capsys.readouterr().out
+    assert main(["simulate"]) == exit_codes.OK
+    folders = [load_configuration(named_folder(bus) / "mudskipper.toml").log.directory for bus in ("robot", "twice")]
+    assert [Path(folder).name for folder in folders] == ["mudskipper-simulated", "mudskipper-simulated-twice"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are another user's")
