@@ -8,7 +8,7 @@ from textwrap import fill
 from typing import Annotated
 
 from command_line import exit_codes
-from command_line.json_output import Answer
+from command_line.json_output import SCHEMAS, Answer
 from command_line.logs.complaints import chosen_vertical, complain_of
 from command_line.logs.log_options import Vertical
 from command_line.screen import watched
@@ -57,7 +57,8 @@ def log_report(
         try:
             out.mkdir(parents=True, exist_ok=True)
             logs = [_copy(path, out) for path in files]
-            written = write_result(out, replace(result, logs=logs), result.summary, watch=watch)
+            summary = {"schema": f"log-{name}/{SCHEMAS[f'log-{name}']}"} | result.json()
+            written = write_result(out, replace(result, logs=logs), summary, watch=watch)
         except OSError as problem:
             raise LogError(f"{problem.filename or out}: {problem.strerror or problem}") from None
     for run in runs:
@@ -65,7 +66,7 @@ def log_report(
     print(fill(result.texts["Result"].partition("\n\n")[0], TERMINAL), file=sys.stderr)
     print(f"written  {len(written)} files in {out}", file=sys.stderr)
     status = exit_codes.OK if result.ending is Ending.DONE else exit_codes.UNHEALTHY
-    return Answer(result.json(), str(out / PAGE), status, f"log-{name}")
+    return Answer(summary, str(out / PAGE), status)
 
 
 def _layout(mud: Sequence[tuple[str, float]], world: Path | None) -> MudLayout | None:
