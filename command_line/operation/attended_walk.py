@@ -60,7 +60,7 @@ def _attend(
         status = exit_codes.INTERRUPTED
     report = _renew(client, as_json)
     client.call("release")
-    return _conclude(report, status)
+    return _conclude("run" if law else "walk", report, status)
 
 
 def _renew(
@@ -92,14 +92,14 @@ def _renew(
         time.sleep(due_s - now_s)
 
 
-def _conclude(report: dict[str, Any], status: int) -> Answer:
-    """Say why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
+def _conclude(command: str, report: dict[str, Any], status: int) -> Answer:
+    """Say why the motion ended. It succeeded if the robot holds its pose and no fault ended it."""
     fault = report["fault"]
     is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
     if not is_sound:
         complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
         status = status or exit_codes.REFUSED
-    return mode_answer("walk", report["mode"], status=status)
+    return mode_answer(command, report["mode"], status=status)
 
 
 class LiveLine:

@@ -95,7 +95,9 @@ def law(folder: Path, body: str) -> str:
 def test_a_law_is_called_once_for_each_stride_that_closed(
     daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
 ) -> None:
-    assert run.run(law(tmp_path, body), socket=tmp_path).print(as_json=False) == exit_codes.OK
+    answer = run.run(law(tmp_path, body), socket=tmp_path)
+    assert answer.print(as_json=False) == exit_codes.OK
+    assert answer.report == {"command": "run", "mode": "hold", "notice": ""}
     assert daemon.orders == list(orders)
 
 
