@@ -45,7 +45,7 @@ class LogReport(NamedTuple):
     alive: bool  # the writer
     dropped: int  # rows, by the full pipe and by the writer
     problem: str  # a message, or empty
-    free_fraction: float  # of the disk
+    free_fraction: float  # of the disk; NaN before the first report
     free_bytes: int
     slowest_write_s: float  # in the last ten seconds, an unfinished one included
     durable_stamp_s: float  # of the newest row that a power cut would leave; NaN before the first
@@ -56,7 +56,7 @@ HEALTHY = LogReport(  # until the writer reports
     alive=True,
     dropped=0,
     problem="",
-    free_fraction=1.0,
+    free_fraction=math.nan,
     free_bytes=1 << 62,
     slowest_write_s=0.0,
     durable_stamp_s=math.nan,

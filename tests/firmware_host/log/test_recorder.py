@@ -27,6 +27,7 @@ from firmware_host.log.recorder import (
     HEALTHY,
     LONGEST_TEXT,
     LogReport,
+    NullRecorder,
     Recorder,
 )
 from firmware_host.log.row_records import pack_record
@@ -275,6 +276,10 @@ def look(recorder: Recorder) -> LogReport:
     """Read the pipe of reports now, and not only after some calls."""
     recorder._calls = 0
     return recorder.report()
+
+
+def test_before_the_writer_reports_the_room_on_the_disk_is_unknown() -> None:
+    assert math.isnan(NullRecorder().report().free_fraction)
 
 
 def test_the_writer_reports_the_disk(recorder: Recorder) -> None:
