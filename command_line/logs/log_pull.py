@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from glob import escape
 from pathlib import Path
 from typing import Annotated
 
@@ -40,14 +41,15 @@ def pull(
     try:
         _rsync(source, [*progress, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"])
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
-        different = _compare(source, into, logs)
+        compared = _compare(source, into, logs)
     except (CommandError, KeyboardInterrupt) as problem:
         copied = counted(len(set(log_files(into, DONE, PRESERVED)) - before), "new log")
         status = exit_codes.UNHEALTHY if isinstance(problem, CommandError) else exit_codes.INTERRUPTED
         raise CommandError(
             f"{str(problem) or 'stopped'}; {copied} copied, the same command continues", status=status
         ) from None
-    same = [path for path in logs if path.name not in different]
+    same = [path for path in logs if compared.get(_place(path)) is True]
+    different = [path.name for path in logs if compared.get(_place(path)) is False]
     _mark(source, into, same)
     complain(
         *(
@@ -71,6 +73,7 @@ def _rsync(source: str, arguments: Sequence[str]) -> str:
             stdout=shown,
             stderr=subprocess.PIPE,
             text=True,
+            errors="surrogateescape",
             check=False,
         )
     except FileNotFoundError:
@@ -81,14 +84,18 @@ def _rsync(source: str, arguments: Sequence[str]) -> str:
     return ended.stdout or ""
 
 
-def _compare(source: str, into: Path, logs: Sequence[Path]) -> list[str]:
-    """Return the names of logs whose bytes are not those of the robot."""
+def _place(log: Path) -> str:
+    return f"{log.parent.name}/{log.name}"
+
+
+def _compare(source: str, into: Path, logs: Sequence[Path]) -> dict[str, bool]:
+    """Return whether each log has the bytes of the robot's; without those that the robot does not have."""
     if not logs:
-        return []
-    only = [*PLACES, *(f"--include=/*/{path.name}" for path in logs), "--exclude=*"]
-    compared = ["--checksum", "--dry-run", "--existing", "--out-format=%n", *only]
-    printed = _rsync(source, [*compared, f"{source}/", f"{into}/"])
-    return [Path(line).name for line in printed.splitlines() if line.endswith(ENDING)]
+        return {}
+    only = [*PLACES, *(f"--include=/*/{escape(path.name)}" for path in logs), "--exclude=*"]
+    compared = ["--checksum", "--dry-run", "--existing", "-ii", "--8-bit-output", "--out-format=%i:%n", *only]
+    lines = _rsync(source, [*compared, f"{source}/", f"{into}/"]).splitlines()
+    return {place: change.startswith(".") for change, _, place in (line.partition(":") for line in lines)}
 
 
 def _mark(source: str, into: Path, logs: Sequence[Path]) -> None:

@@ -11,11 +11,17 @@ from tests.command_line.command_lines import json_of, run, run_process
 from tests.folders import ROOT
 
 RSYNC = """#!{python}
-import pathlib, shutil, signal, sys, os
+import fnmatch, pathlib, shutil, signal, sys, os
 *sources, target = [each for each in sys.argv[1:] if not each.startswith("-")]
 target, left = pathlib.Path(target.split(":")[-1]), int(os.environ.get("COPIES", "99"))
 if "--dry-run" in sys.argv:
-    print("\\n".join(filter(None, [os.environ.get("DIFFERENT", "")])))
+    source = pathlib.Path(sources[0].split(":")[-1])
+    wanted = [each.removeprefix("--include=") for each in sys.argv]
+    for log in sorted(target.glob("[dk]*/*.mcap")):
+        theirs = source / log.parent.name / log.name
+        if theirs.exists() and any(fnmatch.fnmatchcase(f"/{log.parent.name}/{log.name}", each) for each in wanted):
+            same = theirs.read_bytes() == log.read_bytes()
+            print(".f         " if same else ">fc........", theirs.relative_to(source), sep=":")
     sys.exit()
 for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
     if source.name == "copied":
@@ -28,7 +34,8 @@ for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
                 signal.pause()
             sys.exit("ssh: connect to host robot port 22: No route to host")
         (target / log.parent.name).mkdir(exist_ok=True)
-        shutil.copy2(log, target / log.parent.name)
+        if not (target / log.parent.name / log.name).exists():
+            shutil.copy2(log, target / log.parent.name)
 """
 
 
@@ -73,9 +80,19 @@ def test_ctrl_c_in_the_middle_costs_no_log(robot: Path) -> None:
 
 
 def test_a_log_whose_bytes_differ_is_not_marked(robot: Path) -> None:
-    ended = run("log", "pull", str(robot), "here", DIFFERENT="2.mcap")
-    assert ended.returncode == exit_codes.UNHEALTHY and "2.mcap: differs" in ended.stderr
+    (robot / "done" / "2.mcap").rename(robot / "done" / "run [ü].mcap")  # as its operator named it
+    Path("here/done").mkdir(parents=True)
+    Path("here/done/run [ü].mcap").write_text("other")
+    ended = run("log", "pull", str(robot), "here")
+    assert ended.returncode == exit_codes.UNHEALTHY and "run [ü].mcap: differs" in ended.stderr
     assert {path.name for path in (robot / "copied").iterdir()} == {"1", "3"}
+
+
+def test_a_log_that_this_robot_does_not_have_is_not_marked(robot: Path) -> None:
+    Path("here/done").mkdir(parents=True)
+    Path("here/done/0.mcap").write_text("of another robot, whose copy was interrupted")
+    assert json_of("log", "pull", str(robot), "here")["copied"] == ["1.mcap", "2.mcap", "3.mcap"]
+    assert not Path("here/copied/0").exists()
 
 
 def test_without_rsync_or_a_robot_it_says_what_to_do(robot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
