@@ -127,5 +127,5 @@ def _give(client: StatusClient, method: str, order: Report, mode: str) -> None:
 def _send(client: StatusClient, method: str, order: Report) -> None:
     try:
         client.call(method, **order)
-    except (TypeError, ValueError) as problem:
+    except (TypeError, ValueError, OverflowError) as problem:
         raise LawError(f"the order {order!r:.80} cannot be sent: {problem}") from problem

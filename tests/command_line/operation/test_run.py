@@ -6,6 +6,7 @@ from pathlib import Path
 from runpy import run_path
 from typing import Any
 
+import msgpack
 import pytest
 
 from command_line import exit_codes
@@ -38,6 +39,7 @@ class WalkOfTwoStrides(StatusClient):
         if method == "stride":
             if self._refusal:
                 raise CallRefusedError(self._refusal)
+            msgpack.packb(params)  # raises what the real client raises
             self.orders.append(params)
         self._stopped = self._stopped or method == "stop"
         return "accepted"
@@ -109,6 +111,7 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
         ("return __import__('json').loads('')", ("JSONDecodeError", "line 3")),
         ("return 'deep'", ("'deep'",)),
         ("return {'depth_m': 0.03, 4: 'disarm'}", ("4: 'disarm'",)),
+        ("return {'depth_m': 2**64}", ("cannot be sent",)),
     ],
 )
 def test_a_law_that_fails_stops_the_robot_and_is_named(
