@@ -85,14 +85,19 @@ def _open_page(host: str, port: int, socket: Path, names: Sequence[str]) -> tupl
     from command_line.live.page_server import PageServer
 
     page = PageServer(host, port, socket, names)
-    return page, f"http://{host}:{page.port}/"
+    return page, f"http://{_in_url(host)}:{page.port}/"
 
 
 def _open_viewers(host: str, port: int) -> tuple[Audience, str]:
     from command_line.live.viewer_server import ViewerServer
 
     viewers = ViewerServer(host, port)
-    return viewers, f"ws://{host}:{viewers.port}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
+    url = f"ws://{_in_url(host)}:{viewers.port}"
+    return viewers, f"{url}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host  # an address of IPv6
 
 
 def pass_on(rows: RowSubscription, audience: Audience) -> NoReturn:

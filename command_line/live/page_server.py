@@ -18,6 +18,7 @@ from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from socket import AF_INET, AF_INET6
 from typing import Any
 
 from command_line import exit_codes
@@ -182,6 +183,7 @@ class _Server(ThreadingHTTPServer):
     def __init__(self, host: str, port: int, recent: RecentRows, status_socket: Path, names: Collection[str]) -> None:
         self.own_page, self.recent, self.status_socket = own_page(host, names), recent, status_socket
         self.status = SharedStatus(status_socket)
+        self.address_family = AF_INET6 if ":" in host else AF_INET
         super().__init__((host, port), _Handler)
 
     def handle_error(self, request: Any, client_address: Any) -> None:

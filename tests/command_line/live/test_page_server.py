@@ -95,6 +95,18 @@ def open_page(short_folder: Path) -> Iterator[PageServer]:
     server.close()
 
 
+def test_an_address_of_ipv6_serves_the_page_to_a_browser_that_opens_it(short_folder: Path) -> None:
+    if not socket.has_dualstack_ipv6():
+        pytest.skip("this computer has no IPv6")
+    server = PageServer("::1", 0, short_folder / "no daemon")
+    try:
+        connection = HTTPConnection("::1", server.port, timeout=60)  # its Host is [::1]:PORT
+        connection.request("GET", "/")
+        assert connection.getresponse().status == 200
+    finally:
+        server.close()
+
+
 REACHES, REFUSED = 409, 403  # a stop without a daemon; one that does not reach it
 HOSTS = {  # Host of a request to a server on 0.0.0.0, what Origin differs from it by, and whether it is the own page
     "address": ("127.0.0.1", None, True),
