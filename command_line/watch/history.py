@@ -55,6 +55,8 @@ class History:
         joints, flippers = report["drives"], report["loads"].values()
         signals = (tuple(joint[name] for joint in joints) for name in Sample._fields[2:5])
         forces = (tuple(flipper[name] for flipper in flippers) for name in Sample._fields[5:])
+        if self.samples and len(self.samples[-1].angle_rad) != len(joints):
+            self.samples.clear()  # of a daemon before, whose robot had another number of flippers
         self.samples.append(Sample(report["now_s"], report["body_x_m"], *signals, *forces))
 
     def add_strides(self, strides: list[Report]) -> None:

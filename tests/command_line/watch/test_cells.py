@@ -12,7 +12,7 @@ from command_line.robot_text import BAD, OLD
 from command_line.watch.bars import bars
 from command_line.watch.history import History, Sample
 from command_line.watch.joint_plots import View
-from command_line.watch.mud_cells import BOUND, coefficient_rows, trend
+from command_line.watch.mud_cells import BOUND, coefficient_rows, force_text, trend
 from command_line.watch.plain_lines import plain_line
 from command_line.watch.robot_cells import alarm_text, drive_rows, faults_text, machine_text
 from control.faults import FaultKind
@@ -140,3 +140,12 @@ def test_a_lower_bound_is_marked_and_an_unknown_value_is_a_dash(history: History
 @pytest.mark.parametrize(("values", "arrow"), [((1.0,), " "), ((1.0, 1.3), "→"), ((1.0, 1.5), "↗"), ((1.5, 1.0), "↘")])
 def test_the_arrow_shows_a_change_beyond_the_errors(values: tuple[float, ...], arrow: str) -> None:
     assert trend([{"valid": True, "value": value, "repeatability": 0.1} for value in values]) == arrow
+
+
+def test_a_daemon_that_restarts_with_another_number_of_flippers_has_its_own_samples(history: History) -> None:
+    both = copy.deepcopy(history.status)
+    left = both | {"drives": both["drives"][:2], "loads": {"left": both["loads"]["left"]}}
+    for report in (left, both, left):
+        history.add_status(report, NOW_S)
+        force_text(history, 80)
+        assert ("right_sweep" in View(period_s=0.1).text(history, 80, 24).plain) == (report is both)
