@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="make claims", description="ARGS='NAME ... --option'")
     parser.add_argument("names", nargs="*", metavar="NAME", help="of a claim (default: all)")
-    parser.add_argument("--quick", action="store_true", help="only those that CI repeats, two minutes in total")
+    parser.add_argument("--quick", action="store_true", help="only those that CI repeats, three minutes in total")
     parser.add_argument("--rewrite", action="store_true", help="write what was measured to the results and the pages")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="with the 16 measured logs of the accuracy page")
     return parser.parse_args(arguments)
