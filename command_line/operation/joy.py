@@ -78,7 +78,7 @@ class HandDrive:
                 self.message, self._must_release = str(problem), True
                 self.let_go()
                 return
-            for control in controls.pressed - {DEAD_MAN}:
+            for control in {STOP} & controls.pressed or controls.pressed - {DEAD_MAN}:  # a stop overrules the others
                 if now_s - self._acted_s.get(control, float("-inf")) >= AGAIN_S:
                     self._acted_s[control] = now_s
                     self._act(client, control, report)

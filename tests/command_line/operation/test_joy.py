@@ -64,6 +64,14 @@ class Driven:
         return [call for each in self.connections for call in each.calls if call != "lease"]
 
 
+def test_a_stop_that_is_pressed_with_other_controls_is_the_only_one_that_counts() -> None:
+    driven = Driven()
+    driven.step(RELEASED)
+    driven.step(Controls(True, frozenset({DEAD_MAN, ARM, WALK, STOP, DEEPER})), "idle")
+    driven.step(Controls(True, frozenset({DEAD_MAN, WALK, STOP})), "hold", steps=8)
+    assert set(driven.calls) == {"stop"} and len(driven.calls) > 1
+
+
 def test_the_lease_lasts_for_as_long_as_the_dead_man_is_held() -> None:
     driven = Driven()
     driven.step(RELEASED)
