@@ -36,14 +36,20 @@ def pull(
     if robot.startswith("-") or (":" not in robot and not Path(robot).is_dir()):  # ssh takes -oKEY for an option
         raise CommandError(f"{robot}: there is no such folder, and a robot's name ends with a colon: '{robot}:'")
     into.mkdir(parents=True, exist_ok=True)
-    before = set(log_files(into, DONE, PRESERVED))
-    progress = ["--ignore-existing", *["--info=progress2"] * sys.stderr.isatty()]  # a note may have been added here
+    before = log_files(into, DONE, PRESERVED)
+    progress = ["--info=progress2"] * sys.stderr.isatty()
     try:
-        _rsync(source, [*progress, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"])
+        with tempfile.NamedTemporaryFile("w") as here:
+            here.writelines(f"/*/{path.name}\n" for path in before)  # with a note added here, or preserved since
+            here.flush()
+            known = f"--exclude-from={here.name}"
+            _rsync(
+                source, [*progress, known, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"]
+            )
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
         compared = _compare(source, into, logs)
     except (CommandError, KeyboardInterrupt) as problem:
-        copied = counted(len(set(log_files(into, DONE, PRESERVED)) - before), "new log")
+        copied = counted(len(log_files(into, DONE, PRESERVED)) - len(before), "new log")
         status = exit_codes.UNHEALTHY if isinstance(problem, CommandError) else exit_codes.INTERRUPTED
         raise CommandError(
             f"{str(problem) or 'stopped'}; {copied} copied, the same command continues", status=status

@@ -23,11 +23,15 @@ if "--dry-run" in sys.argv:
             same = theirs.read_bytes() == log.read_bytes()
             print(".f         " if same else ">fc........", theirs.relative_to(source), sep=":")
     sys.exit()
+known = [each.partition("=")[2] for each in sys.argv if each.startswith("--exclude-from=")]
+known = pathlib.Path(*known).read_text().splitlines() if known else []
 for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
     if source.name == "copied":
         shutil.copytree(source, target / "copied", dirs_exist_ok=True)
         continue
     for log in sorted([*source.glob("done/*.mcap"), *source.glob("kept/*.mcap")]):
+        if f"/*/{log.name}" in known:
+            continue
         if (left := left - 1) < 0:
             if "INTERRUPT" in os.environ:
                 os.kill(os.getppid(), signal.SIGINT)
@@ -61,6 +65,14 @@ def test_finished_logs_are_copied_compared_and_marked_once(robot: Path) -> None:
     assert {path.name for path in (robot / "copied").iterdir()} == {"1", "2", "3"}
     (robot / "done" / "5.mcap").touch()
     assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == ["5.mcap"]
+
+
+def test_a_log_that_was_preserved_on_either_side_is_not_copied_again(robot: Path) -> None:
+    run("log", "pull", f"host:{robot}", "here")
+    (robot / "done" / "1.mcap").rename(robot / "kept" / "1.mcap")
+    Path("here/done/2.mcap").rename("here/kept/2.mcap")
+    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == []
+    assert sorted(path.name for path in Path("here").rglob("*.mcap")) == ["1.mcap", "2.mcap", "3.mcap"]
 
 
 def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
