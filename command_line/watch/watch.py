@@ -2,6 +2,7 @@
 
 import os
 import sys
+from codecs import getincrementaldecoder
 from collections.abc import Sequence
 from functools import partial
 from importlib.util import find_spec
@@ -39,8 +40,12 @@ def watch(
 
 
 def _show_screen(socket: str | os.PathLike[str], flippers: Sequence[str], period_s: float) -> int:
-    from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
+    from textual.drivers import linux_driver  # textual takes half a second to import
 
+    from command_line.watch.screen_app import WatchApp
+
+    # a byte that is no UTF-8, as of a disturbed serial line, is no key, and does not end the screen
+    vars(linux_driver)["getincrementaldecoder"] = lambda name: partial(getincrementaldecoder(name), "replace")
     app = WatchApp(Feed(Path(socket), period_s), flippers, period_s, partial(send_order, socket))
     return app.run(mouse=False) or exit_codes.OK
 

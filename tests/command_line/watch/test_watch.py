@@ -82,7 +82,9 @@ class Terminal:
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
-@pytest.mark.parametrize(("key", "status"), [(b"q", exit_codes.OK), (b"\x03", exit_codes.INTERRUPTED)])
+@pytest.mark.parametrize(
+    ("key", "status"), [(b"q", exit_codes.OK), (b"\xff\xfcq", exit_codes.OK), (b"\x03", exit_codes.INTERRUPTED)]
+)
 def test_a_terminal_is_left_as_it_was(walked: ServedRobot, short_folder: Path, key: bytes, status: int) -> None:
     with walked.served(short_folder / "s"):
         terminal = Terminal(short_folder / "s", "xterm-256color")
