@@ -9,7 +9,15 @@ from typing import Any, Self
 
 import msgpack
 
-from firmware_host.sockets.rpc import LONGEST_REQUEST, NOT_PERMITTED, REQUEST, TOO_LONG
+from firmware_host.sockets.rpc import (
+    LONGEST,
+    LONGEST_ARRAY,
+    LONGEST_REQUEST,
+    MOST_PARAMS,
+    NOT_PERMITTED,
+    REQUEST,
+    TOO_LONG,
+)
 
 ANSWER_S = 5.0
 OPERATORS = "-operators"  # in the name of their own socket, as the daemon has it
@@ -72,6 +80,9 @@ class StatusClient:
 
         Raises CallRefusedError or NotPermittedError with the daemon's message, or NoDaemonError if no answer comes.
         """
+        longest = max((len(value) for value in params.values() if isinstance(value, list)), default=0)
+        if len(params) > MOST_PARAMS or longest > LONGEST_ARRAY:  # for which the daemon closes the connection
+            raise CallRefusedError(f"{method}: a request has {LONGEST}")
         self._number += 1
         request = msgpack.packb([REQUEST, self._number, method, params], unicode_errors="backslashreplace")
         if len(request) > LONGEST_REQUEST:

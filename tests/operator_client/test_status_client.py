@@ -50,6 +50,21 @@ def test_a_parameter_may_have_any_name(ends: Ends) -> None:
     assert msgpack.unpackb(connection.recv(4096))[2:] == ["trial_set", params]
 
 
+@pytest.mark.parametrize(
+    ("method", "params"),
+    [("walk", {"depths_m": [0.02] * 9}), ("trial_set", {f"k{number}": "1" for number in range(17)})],
+)
+def test_a_request_for_which_the_daemon_closes_the_connection_is_not_sent(
+    ends: Ends, method: str, params: dict[str, Any]
+) -> None:
+    client, connection = ends
+    with pytest.raises(CallRefusedError, match=f"^{method}: a request has at most 16 params, arrays of at most 8$"):
+        client.call(method, **params)
+    connection.sendall(msgpack.packb([rpc.RESPONSE, 1, None, "idle"]))
+    assert client.call("disarm") == "idle"
+    assert msgpack.unpackb(connection.recv(4096))[2] == "disarm"
+
+
 def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
     """An answer stays unread if Ctrl-C interrupts its request."""
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
