@@ -105,7 +105,7 @@ class StandardMessages:
         self._diagnosed_s = -inf
 
     def is_due(self, tick: int) -> bool:
-        return tick >= self._last_tick + TICKS_A_MESSAGE
+        return not 0 <= tick - self._last_tick < TICKS_A_MESSAGE  # ticks begin again after 130 days
 
     def of_tick(self, stamp_ns: int, tick: Row) -> dict[str, bytes]:
         """Return the messages of a tick that is due, encoded, by topic."""

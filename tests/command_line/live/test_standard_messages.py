@@ -53,6 +53,12 @@ def decoded(served: dict[str, list[tuple[int, bytes]]]) -> dict[str, list[tuple[
     return found
 
 
+def test_ticks_have_messages_once_their_number_begins_again(log: Log) -> None:
+    standard, first = StandardMessages(GEOMETRY), log.ticks[0]
+    standard.of_tick(0, {name: first[name] for name in log.ticks.dtype.names or ()} | {"tick": 2**32 - 1})
+    assert standard.is_due(0) and not standard.is_due(2**32 - 1)
+
+
 def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
     states = decoded["/joint_states"]
     assert all(tuple(state.name) == JOINTS for _, state in states)
