@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,13 +107,19 @@ def free_space(folder: Path) -> FreeSpace:
 
 def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[str]:
     """Delete the oldest finished logs until quota and free space are respected; yield the messages. Raises OSError."""
-    used = sum(_size(path) for path in stored_files(folder))
-    for oldest in deletable_logs(folder)[:most]:
-        too_much = 0 < quota_bytes < used
+    deletions = delete_oldest(folder)
+    for _ in range(most):
+        too_much = 0 < quota_bytes < sum(map(_size, stored_files(folder)))
         if not too_much and free_space(folder).free_fraction >= min_free_fraction:
             return
-        used -= _size(oldest)
-        yield delete_log(oldest)
+        yield from islice(deletions, 1)
+
+
+def delete_oldest(folder: Path) -> Iterator[str]:
+    """Delete one log after another, and yield the messages; skip those that cannot be deleted (chattr +i)."""
+    for oldest in deletable_logs(folder):
+        with suppress(OSError):
+            yield delete_log(oldest)
 
 
 def deletable_logs(folder: Path) -> list[Path]:

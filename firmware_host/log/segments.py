@@ -15,6 +15,7 @@ import time
 from contextlib import suppress
 from datetime import UTC, datetime
 from hashlib import sha256
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,8 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile, Rows
 from firmware_host.log.log_folder import (
     ACTIVE,
-    deletable_logs,
     delete_by_quota,
-    delete_log,
+    delete_oldest,
     finished_path,
     free_space,
     segment_path,
@@ -235,9 +235,9 @@ class LogSegments:
         """Delete the oldest log at once where the disk was full, logs may be deleted, and deleting helped before."""
         may_delete = self._parameters.quota_bytes > 0 or self._parameters.min_free_fraction > 0.0
         if self._full and self._folder is not None and may_delete and self._deleting_helps:
-            for oldest in deletable_logs(self._folder)[:1]:
-                before = free_space(self._folder).free_bytes
-                self._deleted.append(delete_log(oldest))
+            before = free_space(self._folder).free_bytes
+            for message in islice(delete_oldest(self._folder), 1):
+                self._deleted.append(message)
                 self._deleting_helps = free_space(self._folder).free_bytes > before
         self._full = False
 
@@ -246,7 +246,7 @@ class LogSegments:
             return
         self._quota_s = time.monotonic() + QUOTA_INTERVAL_S
         quota_bytes, fraction = self._parameters.quota_bytes, self._parameters.min_free_fraction
-        with suppress(OSError):  # a log that cannot be deleted shows as a full disk
+        with suppress(OSError):  # the disk gives no answer
             for message in delete_by_quota(self._folder, quota_bytes, fraction):
                 if self._file is None:
                     self._deleted.append(message)

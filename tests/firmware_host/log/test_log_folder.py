@@ -71,6 +71,12 @@ def test_the_quota_frees_old_finished_logs(
     assert left == set("".join(logs.values())) - set(deleted)
 
 
+def test_a_log_that_cannot_be_deleted_does_not_keep_the_quota_from_others(tmp_path: Path) -> None:
+    (tmp_path / DONE / "0.mcap").mkdir(parents=True)  # stands for a file with the attribute "immutable"
+    make_files(tmp_path, DONE, "1", "2", "3")
+    assert [text.split()[3] for text in delete_by_quota(tmp_path, 1, 0.0)] == ["1.mcap", "2.mcap"]
+
+
 def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
     assert free_space(tmp_path / "none" / "yet").free_fraction == pytest.approx(
         free_space(tmp_path).free_fraction, abs=0.05

@@ -159,6 +159,7 @@ def test_a_full_disk_frees_nothing_where_nothing_may_be_freed_and_stops_where_it
 ) -> None:
     """Another program uses the freed space, or a second link keeps the deleted file."""
     old = make_old_logs(tmp_path, 5)
+    (old[0].parent / "0.mcap").mkdir()  # the oldest, which cannot be deleted
     log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=quota_bytes))
     monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
     with monkeypatch.context() as patch:
