@@ -39,8 +39,10 @@ def pull(
     before = log_files(into, DONE, PRESERVED)
     progress = ["--info=progress2"] * sys.stderr.isatty()
     try:
-        with tempfile.NamedTemporaryFile("w") as here:
-            here.writelines(f"/*/{path.name}\n" for path in before)  # with a note added here, or preserved since
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", errors="surrogateescape") as here:
+            here.writelines(
+                f"/*/{escape(path.name)}\n" for path in before
+            )  # with a note added here, or preserved since
             here.flush()
             known = f"--exclude-from={here.name}"
             _rsync(

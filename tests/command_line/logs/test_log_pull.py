@@ -30,7 +30,7 @@ for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
         shutil.copytree(source, target / "copied", dirs_exist_ok=True)
         continue
     for log in sorted([*source.glob("done/*.mcap"), *source.glob("kept/*.mcap")]):
-        if f"/*/{log.name}" in known:
+        if any(fnmatch.fnmatchcase(f"/{log.parent.name}/{log.name}", each) for each in known):
             continue
         if (left := left - 1) < 0:
             if "INTERRUPT" in os.environ:
@@ -38,8 +38,7 @@ for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
                 signal.pause()
             sys.exit("ssh: connect to host robot port 22: No route to host")
         (target / log.parent.name).mkdir(exist_ok=True)
-        if not (target / log.parent.name / log.name).exists():
-            shutil.copy2(log, target / log.parent.name)
+        shutil.copy2(log, target / log.parent.name)
 """
 
 
@@ -97,6 +96,7 @@ def test_a_log_whose_bytes_differ_is_not_marked(robot: Path) -> None:
     Path("here/done/run [ü].mcap").write_text("other")
     ended = run("log", "pull", str(robot), "here")
     assert ended.returncode == exit_codes.UNHEALTHY and "run [ü].mcap: differs" in ended.stderr
+    assert Path("here/done/run [ü].mcap").read_text() == "other"
     assert {path.name for path in (robot / "copied").iterdir()} == {"1", "3"}
 
 
