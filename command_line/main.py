@@ -22,12 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     complaints.clear()
     answers.clear()
-    for name in ("stdin", "stdout", "stderr"):
-        if getattr(sys, name) is None:  # it was closed: without a standard error, `print` would take standard output
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), "w"))
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without ± or ³ shows a question mark
+    _prepare_streams()
     try:
         status = _run(given)
     except SystemExit as ended:  # as argparse ends
@@ -35,6 +30,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise
     _answer(given, status)
     return status
+
+
+def _prepare_streams() -> None:
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed: without a standard error, `print` would take standard output
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), "w"))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without ± or ³ shows a question mark
 
 
 def _answer(given: Sequence[str], status: int) -> None:

@@ -16,7 +16,7 @@ from firmware_host.configuration.toml_records import read_text
 
 COPY = "mudskipper.toml"  # of a simulated robot's configuration
 LARGEST_UNCERTAINTY = 0.02  # relative, of a torque constant that is written
-WRITE, LEAVE = "y", ""
+WRITE = "y"
 SET_DRIVES = (
     ". 'systemctl stop mudskipper', set the drives' own constants to the same values ('mudskipper drives setup' "
     "compares them), then 'systemctl start mudskipper'"
@@ -67,8 +67,7 @@ def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, 
     def agrees(difference: str) -> bool:
         nonlocal is_written
         operator.report(difference)
-        answers = {WRITE: "write it", LEAVE: "leave it"}
-        is_written = operator.ask(f"Write this to {path}?", answers, lambda: None) == WRITE
+        is_written = operator.ask(f"Write this to {path}?", {WRITE: "write it", "": "leave it"}, lambda: None) == WRITE
         return is_written
 
     try:

@@ -125,12 +125,8 @@ def _strokes_of(stride: StrideEstimate, met: StrideTruth, geometry: FlipperGeome
         lean_rad, depth_m = geometry.adduction_rad(0.0, nominal_m), nominal_m - met.surface_m
         return StrokeTruth(0.0, lean_rad, depth_m, estimate.speed_m_s, UNKNOWN, depth_m, across_m)
 
-    return replace(
-        met,
-        insertion=stroke(stride.k_p),
-        stance=stroke(stride.k_s),
-        extraction=stroke(stride.k_e, 1.0 - REVERSAL_FRACTION),  # which names the depth where its fit begins
-    )
+    rising = stroke(stride.k_e, 1.0 - REVERSAL_FRACTION)  # which names the depth where its fit begins
+    return replace(met, insertion=stroke(stride.k_p), stance=stroke(stride.k_s), extraction=rising)
 
 
 def _compared(trial: Trial, truths: FlipperTruths, closed: Sequence[StrideEstimate], **keys: Any) -> Iterator[Row]:

@@ -50,14 +50,13 @@ def program_text(record: Mapping[str, str]) -> str:
 @cache
 def source_digest(*modules: str) -> str:
     """Return a digest of these modules and of all that they import. Raises ValueError for an unknown module."""
-    texts: dict[str, bytes] = {}
-    left = list(modules)
+    texts, left = dict[str, bytes](), list(modules)
     while left:
         module = left.pop()
         if module not in texts and (text := _text_of(module)) is not None:
             texts[module] = text
-            files = ROOT.glob(FILES[module]) if module in FILES else ()
-            texts |= {file.name: file.read_bytes() for file in files}
+            if module in FILES:
+                texts |= {file.name: file.read_bytes() for file in ROOT.glob(FILES[module])}
             left += [module.rpartition(".")[0], *_imports(module)]
     if unknown := set(modules) - set(texts):
         raise ValueError(f"{', '.join(sorted(unknown))}: no module of {PACKAGE}")

@@ -105,8 +105,7 @@ def _find_names(path: Path, lines: list[str]) -> int:
 
 def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], list[Finding]]:
     """Return the settings that are numbers, the names without one, and what is reported about them."""
-    filled = (line.rstrip(", ") for line in head)  # a spreadsheet makes lines equally long by commas
-    names, values = _split_settings([line for line in filled if line])
+    names, values = _split_settings([line for each in head if (line := each.rstrip(", "))])  # a spreadsheet adds commas
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
         missing = _without_texts(names)
