@@ -105,7 +105,7 @@ def _find_names(path: Path, lines: list[str]) -> int:
 
 def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], list[Finding]]:
     """Return the settings that are numbers, the names without one, and what is reported about them."""
-    names, values = _split_settings([line for each in head if (line := each.rstrip(", "))])  # a spreadsheet adds commas
+    names, values = _split_settings([line for line in head if line.strip(", ")])
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
         missing = _without_texts(names)
@@ -127,7 +127,10 @@ def _split_settings(head: list[str]) -> tuple[Cells, Cells]:
         head = list(head[0].removeprefix(GAIT_HEADER).partition("|")[::2])
     if len(head) != 2:
         return [], []
-    names, values = ([cell.strip() for cell in line.split(",")] for line in head)
+    names, values = ([cell.strip() for cell in line.split(",")] for line in (head[0].rstrip(", "), head[1]))
+    is_padded = head[0].endswith(",")  # by a spreadsheet, which makes all lines as long as the rows
+    while values and not values[-1] and (is_padded or len(values) > len(names)):
+        values.pop()
     return names, values
 
 

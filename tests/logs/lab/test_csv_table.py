@@ -35,6 +35,7 @@ HEADS = {
     "joined": (f"# gait header: {NAMES} | {VALUES}",),
     "with an empty line": (NAMES, VALUES, ""),
     "made as long as the rows by a spreadsheet": (f"{NAMES},", f"{VALUES},", ",,,,"),
+    "joined and made as long": (f"# gait header: {NAMES} | {VALUES},,",),
 }
 
 
@@ -49,10 +50,11 @@ def test_settings_and_rows_are_read_under_every_head(head: tuple[str, ...], tmp_
     assert table.line.tolist() == [len(head) + 2 + number for number in range(6)]
 
 
-@pytest.mark.parametrize("values", [VALUES, f"{VALUES},"])
-def test_more_names_than_values_leave_every_setting_unknown(values: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("added", ["", ",,"], ids=["as written", "by a spreadsheet"])
+def test_more_names_than_values_leave_every_setting_unknown(added: str, tmp_path: Path) -> None:
     """Otherwise the value of one setting would be read under the name of another."""
-    table = read_table(write(tmp_path / "run.csv", NAMES + ",wiggle_amplitude", values, COLUMNS, *ROWS), WANTED)
+    head = f"{NAMES},wiggle_amplitude{added}", f"{VALUES}{added}{added[:1]}"
+    table = read_table(write(tmp_path / "run.csv", *head, COLUMNS, *ROWS), WANTED)
     assert table.gait == {}
     assert table.missing_settings == ("lateral_angle_range", "insertion_angle", "wiggle_amplitude")
     assert [finding.kind for finding in table.findings] == [FindingKind.MISSING_SETTING]
@@ -60,6 +62,8 @@ def test_more_names_than_values_leave_every_setting_unknown(values: str, tmp_pat
 
 
 def test_a_setting_without_a_number_is_missing(tmp_path: Path) -> None:
+    table = read_table(write(tmp_path / "run.csv", NAMES, "turtle,True,0.6,", COLUMNS, *ROWS), WANTED)
+    assert table.gait == {"lateral_angle_range": 0.6} and table.missing_settings == ("insertion_angle",)
     table = read_table(write(tmp_path / "run.csv", NAMES, "turtle,True,,nan", COLUMNS, *ROWS), WANTED)
     assert table.gait == {} and table.missing_settings == ("lateral_angle_range", "insertion_angle")
 
