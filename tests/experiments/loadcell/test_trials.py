@@ -98,19 +98,24 @@ def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> N
         assert list_problems(AnalysedTrial(sound), stretch, 0.0) == []
 
 
-def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
-    laboratory = make(trials=2)
-    stage, asked = laboratory.cell.stage, list[str]()
-    answers = [GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON]
+def measured(laboratory: Laboratory, *answers: str) -> list[CellTrial]:
+    """Measure with these answers before each trial; return the trials for which they were asked."""
+    stage, left, asked = laboratory.cell.stage, [*answers], list[CellTrial]()
     prepare = stage.prepare
 
     def answer(trial: CellTrial, trials: int) -> str:
-        asked.append(trial.key)
+        asked.append(trial)
         prepare(trial, trials)
-        return answers.pop(0)
+        return left.pop(0)
 
     stage.prepare = answer  # type: ignore[method-assign]
     laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    return asked
+
+
+def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
+    laboratory = make(trials=2)
+    asked = [trial.key for trial in measured(laboratory, GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON)]
     first, second, third, fourth = (trial.key for trial in laboratory.plan.list_trials())
     assert asked == [first, second, first, second, third, fourth]
     assert laboratory.notebook.entries[second] == {"skipped": True}
@@ -120,17 +125,7 @@ def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> No
 
 def test_before_an_invalid_trial_is_repeated_the_one_before_can_be(make: Make) -> None:
     laboratory = make(trials=1, amplifier=AmplifierParameters(rate_hz=10.0))  # too slow for an insertion
-    stage, asked = laboratory.cell.stage, list[str]()
-    answers = [GO_ON, GO_ON, REDO, GO_ON, SKIP]
-    prepare = stage.prepare
-
-    def answer(trial: CellTrial, trials: int) -> str:
-        asked.append(trial.kind)
-        prepare(trial, trials)
-        return answers.pop(0)
-
-    stage.prepare = answer  # type: ignore[method-assign]
-    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
+    asked = [trial.kind for trial in measured(laboratory, GO_ON, GO_ON, REDO, GO_ON, SKIP)]
     assert asked == [SHEAR, INSERTION, INSERTION, SHEAR, INSERTION]
 
 
