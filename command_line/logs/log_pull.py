@@ -39,15 +39,12 @@ def pull(
     before = log_files(into, DONE, PRESERVED)
     progress = ["--info=progress2"] * sys.stderr.isatty()
     try:
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", errors="surrogateescape") as here:
-            here.writelines(
-                f"/*/{escape(path.name)}\n" for path in before
-            )  # with a note added here, or preserved since
-            here.flush()
-            known = f"--exclude-from={here.name}"
-            _rsync(
-                source, [*progress, known, *PLACES, f"--include=/*/*{ENDING}", "--exclude=*", f"{source}/", f"{into}/"]
-            )
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", errors="surrogateescape") as known:
+            # a log that is here may have a note added here, or be preserved since
+            known.writelines(f"/*/{escape(path.name)}\n" for path in before)
+            known.flush()
+            chosen = [f"--exclude-from={known.name}", *PLACES, f"--include=/*/*{ENDING}", "--exclude=*"]
+            _rsync(source, [*progress, *chosen, f"{source}/", f"{into}/"])
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
         compared = _compare(source, into, logs)
     except (CommandError, KeyboardInterrupt) as problem:

@@ -32,15 +32,7 @@ from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.load_cell_truth import REVERSAL_FRACTION, FlipperTruths, true_strides
 from experiments.trials.predicted_load import LoadError, load_errors
-from experiments.trials.trial import (
-    LATENCY_S,
-    TORQUE_ERROR,
-    WALKING,
-    Setup,
-    Trial,
-    replay_trial,
-    run_trial,
-)
+from experiments.trials.trial import LATENCY_S, TORQUE_ERROR, WALKING, Setup, Trial, replay_trial, run_trial
 from firmware_host.configuration.gait_file import gait_document, read_gait
 from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
