@@ -1,7 +1,7 @@
 """The body's position from an encoder on its rail: a serial port on which a counter sends one count per line.
 
 encoder_counts.py decodes the lines and rejects implausible counts; serial_line.py opens and reads the port. Where the
-counts begin anew, one read has no pose: the body has not moved so far, and no stroke must count it as motion. An
+counts begin again, one read has no pose: the body has not moved so far, and no stroke must count it as motion. An
 unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
