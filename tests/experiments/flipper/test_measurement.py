@@ -131,6 +131,7 @@ def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> 
     with pytest.raises(InvalidTrialError, match="the base moved by .* mm") as invalid:
         measure(bench, "right", 0.03, 1, TRIAL)
     assert invalid.value.entry is not None and invalid.value.entry["remarks"] == []
+    bench.robot.close()
 
 
 # the report
@@ -233,3 +234,4 @@ def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
     (truth,) = entry["truths"].values()
     assert all(stride[name]["valid"] for name in ("k_p", "k_s", "k_e"))
     assert stride["k_s"]["value"] == pytest.approx(truth["k_s"], rel=0.15)
+    bench.robot.close()
