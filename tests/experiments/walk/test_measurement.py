@@ -1,6 +1,7 @@
 """Walks over several muds: the mud of each stride, with and without a pose, and the paper's findings next to ours."""
 
 import json
+from contextlib import closing
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -172,7 +173,8 @@ def walk_once(folder: Path, muds: Muds = MUDS, **changes: Any) -> Entry:
     bench.robot.__class__ = ChangedRobot
     vars(bench.robot).update(changes)
     bench.prepare(TINY.planned[0])
-    return measure(bench, replace(TINY, muds=muds), TINY.planned[0])
+    with closing(bench.robot):
+        return measure(bench, replace(TINY, muds=muds), TINY.planned[0])
 
 
 def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(tmp_path: Path) -> None:
