@@ -9,6 +9,7 @@ the difference is given as a fraction of the stride's largest torque, next to th
 (experiments/trials/predicted_load.py).
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
@@ -33,7 +34,7 @@ from experiments.study.trials import Trials
 from experiments.trials.load_cell_truth import REVERSAL_FRACTION, FlipperTruths, true_strides
 from experiments.trials.predicted_load import LoadError, load_errors
 from experiments.trials.trial import LATENCY_S, TORQUE_ERROR, WALKING, Setup, Trial, replay_trial, run_trial
-from firmware_host.configuration.gait_file import gait_document, read_gait
+from firmware_host.configuration.gait_file import as_json, gait_document, read_gait
 from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.disturbances import LAB
@@ -55,12 +56,13 @@ def study(
     seeds: Annotated[int, Option("walks on each ground", low=1, high=100)] = 5,
 ) -> Result:
     """The coefficients of a ground from paths other than the crutching gait."""
-    for name in gait:
-        read_gait(gait_document(name))  # refused before anything runs
+    documents = {name: gait_document(name) for name in gait}
+    for document in documents.values():
+        read_gait(document)  # refused before anything runs
     walked = {"depth_m": depth / 100.0, "strides": strides}
     rows = [
-        {"gait": name, "ground": each, "seed": seed, **walked}
-        for name in gait
+        {"gait": name, "document": as_json(document), "ground": each, "seed": seed, **walked}
+        for name, document in documents.items()
         for each in ground
         for seed in range(1, seeds + 1)
     ]
@@ -79,10 +81,10 @@ def study(
     )
 
 
-def walk(gait: str, ground: str, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
+def walk(gait: str, document: str, ground: str, seed: int, depth_m: float, strides: int) -> dict[str, Any]:
     """Return the speed of a walk, and its estimates with their truths and the errors of their predictions."""
     track, on = Track([(ENDLESS_M, GROUNDS[ground])]), disturbances_on(GROUNDS[ground], LAB)
-    trial = run_trial(setup_of(gait, depth_m), track, on, strides, seed, TORQUE_ERROR, LATENCY_S)
+    trial = run_trial(setup_of(document, depth_m), track, on, strides, seed, TORQUE_ERROR, LATENCY_S)
     first, last = trial.samples[0], trial.samples[-1]
     closed = [stride for stride, _ in replay_trial(trial, EstimationParameters(surface_error_m=LAB.surface_error_m))]
     met = {(truth.flipper, truth.index): truth for truth in trial.truths}
@@ -97,8 +99,8 @@ def walk(gait: str, ground: str, seed: int, depth_m: float, strides: int) -> dic
     }
 
 
-def setup_of(gait: str, depth_m: float) -> Setup:
-    path = read_gait(gait_document(gait))
+def setup_of(document: str, depth_m: float) -> Setup:
+    path = read_gait(json.loads(document))
     parameters = crutching_parameters(path)
     if parameters:
         return replace(WALKING, depth_m=depth_m, gait=parameters)
