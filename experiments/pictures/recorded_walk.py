@@ -88,11 +88,6 @@ class RecordedWalk(NamedTuple):
         return self.geometry.flipper_length_m * sin(self.sweep_rad)
 
     @property
-    def geometric_step_m(self) -> float:
-        """The step with a plate that does not move in the mud during the sweep: 2 l sin α; NaN on a fixed base."""
-        return nan if self.fixed_base else 2.0 * self.reach_m
-
-    @property
     def own_strides(self) -> list[dict[str, Any]]:
         """The strides of `flipper`."""
         return [stride for stride in self.strides if FLIPPERS[stride["flipper"]] == self.flipper]

@@ -6,6 +6,7 @@ flipper does not come out of the mud.
 
 from collections.abc import Sequence
 from enum import StrEnum
+from math import isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, in_detail
 
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 
+LEAST_STEP_M = 0.005  # of a stance that moves the body; a probe has none
 FULL_FRACTION = 0.5  # of the geometric step; below it a stride slips
 MOMENTS = (  # caption, phase, and the elapsed fraction of the phase
     ("insertion", Phase.INSERTION, 0.0),
@@ -44,19 +46,33 @@ class Moment(NamedTuple):
     row: int
 
 
-def outcome_of(stride: Stride, geometric_step_m: float) -> Outcome:
+def outcome_of(walk: RecordedWalk, stride: Stride) -> Outcome:
     if not stride["released"]:
         return Outcome.STUCK
-    if np.isnan(stride["step_m"] - geometric_step_m):
+    step_m, full_m = stride["step_m"], geometric_step_m(walk, stride)
+    if not (abs(full_m) > LEAST_STEP_M and isfinite(step_m)):
         return Outcome.UNKNOWN
-    return Outcome.SLIPPING if stride["step_m"] < FULL_FRACTION * geometric_step_m else Outcome.GOOD
+    return Outcome.SLIPPING if step_m / full_m < FULL_FRACTION else Outcome.GOOD
+
+
+def geometric_step_m(walk: RecordedWalk, stride: Stride) -> float:
+    """Return the step with a plate that does not move in the mud during the stance: l (sin α₀ - sin α₁).
+
+    It is negative where the flipper sweeps forward, as in a backward walk; NaN on a fixed base and without a stance.
+    """
+    rows = rows_of(walk, stride)
+    stance = rows.start + np.flatnonzero(walk.phase[rows.start : rows.stop] == Phase.STANCE)
+    if walk.fixed_base or not len(stance):
+        return nan
+    begin, end = np.sin(walk.sweep_angle_rad[stance[[0, -1]]])
+    return walk.geometry.flipper_length_m * float(begin - end)
 
 
 def choose_strides(walk: RecordedWalk) -> list[Stride]:
     """Return the clearest stride of each outcome."""
     chosen = []
     for outcome in Outcome:
-        strides = [stride for stride in walk.own_strides if outcome_of(stride, walk.geometric_step_m) is outcome]
+        strides = [stride for stride in walk.own_strides if outcome_of(walk, stride) is outcome]
         ranks = [_rank(walk, stride, outcome) for stride in strides]
         if strides:
             chosen.append(strides[ranks.index(min(ranks))])

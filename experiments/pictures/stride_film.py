@@ -69,7 +69,7 @@ def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: S
 
 def _fullest_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
     """Return the frame with the largest force of each outcome; together they have all colours of the film."""
-    one_of_each = {outcome_of(stride, walk.geometric_step_m): stride for stride in strides}.values()
+    one_of_each = {outcome_of(walk, stride): stride for stride in strides}.values()
     return [(stride, max(rows_of(walk, stride), key=lambda row: hypot(*_force_n(walk, row)))) for stride in one_of_each]
 
 
@@ -107,7 +107,7 @@ def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:
 
 
 def _draw_texts(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
-    outcome = outcome_of(stride, walk.geometric_step_m)
+    outcome = outcome_of(walk, stride)
     texts = {
         0.02: (f"{outcome.of_stride} {stride['index']}", OUTCOME_COLOURS[outcome]),
         0.30: (Phase(int(walk.phase[row])).name.lower(), INK),

@@ -62,7 +62,7 @@ def _draw_row(panel: Axes, walk: RecordedWalk, stride: Stride, captions: Sequenc
 
 
 def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
-    outcome, corner = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
+    outcome, corner = outcome_of(walk, stride), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
     details = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
     title = panel.annotate(outcome.of_stride, corner, weight="bold", size=15, color=OUTCOME_COLOURS[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from control.records import COEFFICIENTS
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import Floats, RecordedWalk
-from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
+from experiments.pictures.stride_choice import Outcome, Stride, geometric_step_m, outcome_of
 from experiments.pictures.walk_trace import rows_of_curve
 from experiments.reports.style import (
     FAINT,
@@ -186,14 +186,15 @@ def _draw_steps(panel: Axes, walk: RecordedWalk) -> None:
     """Draw a bar from the start of each stride to its end, in the colour of its outcome."""
     known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
     for outcome in Outcome:
-        own = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
+        own = [stride for stride in known if outcome_of(walk, stride) is outcome]
         starts_s, ends_s, steps_m = _columns(own, "t_start_s", "stamp_s", "step_m")
         if own:
             colour = OUTCOME_COLOURS[outcome]
             _draw_boxes(panel, starts_s, ends_s, 100.0 * steps_m, color=colour, label=str(outcome))
     panel.axhline(0.0, color=FAINT, linewidth=0.8)
-    if np.isfinite(walk.geometric_step_m):
-        step_cm = 100.0 * walk.geometric_step_m
+    full_m = [each for stride in known if np.isfinite(each := geometric_step_m(walk, stride))]
+    if full_m:
+        step_cm = 100.0 * np.median(full_m)
         panel.axhline(step_cm, color=INK, linewidth=0.8, linestyle=":", label="$2l\\,\\sin\\alpha$")
     if panel.get_legend_handles_labels()[0]:
         panel.legend(ncols=4, **LEGEND)

@@ -178,7 +178,7 @@ def _describe_strides(walks: Sequence[RecordedWalk], layout: MudLayout | None) -
                     "duration_s": end_s - first["t_start_s"],
                     "step_m": first["step_m"],
                     "depth_m": max(float(row["depth_m"]) for row in rows),
-                    "outcome": str(outcome_of(together, walk.geometric_step_m)),
+                    "outcome": str(outcome_of(walk, together)),
                     "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows),
                     "supply_v": min((v for row in rows if isfinite(v := row.get("supply_min_v", nan))), default=nan),
                 }

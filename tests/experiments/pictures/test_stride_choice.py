@@ -13,6 +13,7 @@ from experiments.pictures.stride_choice import (
     Outcome,
     choose_strides,
     duration_s,
+    geometric_step_m,
     moments_of,
     outcome_of,
     rows_of,
@@ -36,9 +37,11 @@ def stride_row(index: int, step_m: float, released: bool = True, flipper: int = 
     }
 
 
-def walk_of(strides: list[dict[str, Any]]) -> RecordedWalk:
+def walk_of(strides: list[dict[str, Any]], direction: float = 1.0) -> RecordedWalk:
+    """Each flipper sweeps from one side to the other in its stance."""
     phases = [phase for _ in strides for phase in STROKES for _ in range(ROWS)]
     unknown = np.full(len(phases), nan)
+    sweeps_rad = direction * np.radians([30.0, *np.linspace(30.0, -30.0, ROWS), -30.0])
     return RecordedWalk(
         title="made up",
         geometry=FlipperGeometry(),
@@ -46,7 +49,7 @@ def walk_of(strides: list[dict[str, Any]]) -> RecordedWalk:
         flipper="right",
         time_s=np.arange(len(phases), dtype=np.float64) / 10.0,
         phase=np.array(phases, dtype=np.int64),
-        sweep_angle_rad=unknown,
+        sweep_angle_rad=np.tile(np.repeat(sweeps_rad, [ROWS, *[1] * ROWS, 2 * ROWS]), len(strides)),
         adduction_angle_rad=unknown,
         depth_m=unknown.copy(),
         depth_command_m=unknown,
@@ -59,27 +62,31 @@ def walk_of(strides: list[dict[str, Any]]) -> RecordedWalk:
 
 
 @pytest.mark.parametrize(
-    ("step_m", "released", "outcome"),
+    ("step_m", "released", "direction", "outcome"),
     [
-        (0.0601, True, Outcome.GOOD),
-        (0.0599, True, Outcome.SLIPPING),
-        (0.12, False, Outcome.STUCK),
-        (nan, False, Outcome.STUCK),
-        (nan, True, Outcome.UNKNOWN),
+        (0.0601, True, 1.0, Outcome.GOOD),
+        (0.0599, True, 1.0, Outcome.SLIPPING),
+        (-0.0601, True, -1.0, Outcome.GOOD),
+        (0.0601, True, -1.0, Outcome.SLIPPING),
+        (0.0, True, 0.0, Outcome.UNKNOWN),
+        (0.12, False, 1.0, Outcome.STUCK),
+        (nan, False, 1.0, Outcome.STUCK),
+        (nan, True, 1.0, Outcome.UNKNOWN),
     ],
 )
 def test_a_stride_fails_below_half_of_the_geometric_step_or_where_the_flipper_stays(
-    step_m: float, released: bool, outcome: Outcome
+    step_m: float, released: bool, direction: float, outcome: Outcome
 ) -> None:
-    walk = walk_of([stride_row(0, step_m, released)])
-    assert walk.geometric_step_m == pytest.approx(STEP_M)
-    assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
+    """A flipper that sweeps forward walks backward; one that does not sweep probes."""
+    walk = walk_of([stride_row(0, step_m, released)], direction)
+    assert geometric_step_m(walk, walk.strides[0]) == pytest.approx(STEP_M * direction)
+    assert outcome_of(walk, walk.strides[0]) is outcome
 
 
 @pytest.mark.parametrize(("released", "outcome"), [(True, Outcome.UNKNOWN), (False, Outcome.STUCK)])
 def test_on_a_fixed_base_no_stride_slips(released: bool, outcome: Outcome) -> None:
     walk = walk_of([stride_row(0, 0.0, released)])._replace(fixed_base=True)
-    assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
+    assert outcome_of(walk, walk.strides[0]) is outcome
 
 
 def test_the_clearest_stride_of_each_outcome_is_chosen() -> None:

@@ -63,7 +63,7 @@ def test_distance_time_and_strides_are_those_of_the_simulated_robot(walked: tupl
 def test_each_stride_is_in_the_mud_in_which_the_plates_go_down(walked: tuple[Run, float]) -> None:
     """The true borders are the reference; a stride near a border belongs to no mud."""
     run, _ = walked
-    reach_m = run.walks[0].geometric_step_m / 2.0
+    reach_m = run.walks[0].reach_m
     muds = {"w = 48.5 %": (-1.0, 0.61), "w = 53.1 %": (0.61, 1.22)}
     named = run.strides[run.strides["mud"] != ""]
     assert 5 <= len(named) <= 7 and set(named["mud"]) == set(muds)
