@@ -5,7 +5,7 @@ Both report a stride with the same keys and units: those of the socket's `stride
 
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from math import fsum
 from pathlib import Path
@@ -89,7 +89,7 @@ class DaemonWalk:
 
     def __init__(self, world: Tables, seed: int, depth_m: float | None, socket: Path | None = None) -> None:
         with ExitStack() as begun:
-            owned = simulate(world, seed=seed) if socket is None else Client(socket, lease_s=LEASE_S)
+            owned = simulate(world, seed=seed) if socket is None else closing(Client(socket, lease_s=LEASE_S))
             self._client = client = begun.enter_context(owned)
             if socket is None:
                 client.arm()
@@ -134,8 +134,10 @@ class DaemonWalk:
         return sweep["angle_rad"], lift["angle_rad"], self._before["body_x_m"] or 0.0
 
     def end(self) -> None:
-        """Stop the robot, which walks on otherwise."""
+        """Stop the robot, which walks on otherwise, and let its operator arm it again."""
         self._client.stop()
+        self._client.release()
 
     def close(self) -> None:
+        """A robot that still walks stops, since its lease is lost and not released."""
         self._connection.close()

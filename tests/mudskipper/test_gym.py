@@ -103,7 +103,7 @@ def test_a_robot_behind_a_socket_is_moved_only_with_an_operator(options: dict[st
         MudWalk(**options)
 
 
-def test_an_operator_arms_the_robot_of_a_socket_before_each_reset(own_bench: Bench) -> None:
+def test_an_operator_arms_the_robot_of_a_socket_before_each_reset_and_close_stops_it(own_bench: Bench) -> None:
     with MudWalk(backend="daemon", socket=own_bench.socket, operated=True, duration_s=1.0) as walk:
         with pytest.raises(RuntimeError, match="idle"):
             walk.reset()
@@ -113,7 +113,10 @@ def test_an_operator_arms_the_robot_of_a_socket_before_each_reset(own_bench: Ben
             walk.reset()
             _, _, fault, over, info = walk.step(np.zeros(3, np.float32))
             assert over and not fault and info["advance_m"] > 0.01
-            assert operator.wait_for("hold")
+            assert operator.wait_for("hold")["lease"] is None
+            walk.reset()
+            walk.close()  # in the middle of an episode
+            assert "lease_lost" in operator.wait_for("idle")["notice"]
 
 
 def test_the_robot_s_own_method_walks_where_actions_are_ignored() -> None:
