@@ -153,7 +153,11 @@ def _packed(fits: StrideFits) -> StrideFits:
     for found in (samples() for samples in fits):
         columns = [array("d", values) for values in found[:-1]] if found else []
         packed.append(FitSamples(columns[0], columns[1], columns[2], found.slope) if found else None)
-    return StrideFits(*(partial(lambda samples: samples, each) for each in packed))
+    return StrideFits(*(partial(_stored, each) for each in packed))
+
+
+def _stored(samples: FitSamples | None) -> FitSamples | None:
+    return samples  # no lambda, which cannot come from another process
 
 
 def configuration_of(path: Path, text: str) -> Configuration:

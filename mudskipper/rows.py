@@ -27,6 +27,10 @@ class Rows(np.ndarray[Any, np.dtype[np.void]]):
         self.wall_offset_ns = getattr(parent, "wall_offset_ns", None)
         self.kind = getattr(parent, "kind", None)  # type: ignore[assignment]  # only `of` makes rows of no rows
 
+    def __reduce__(self) -> Any:
+        """Rows that come from another process know their kind."""
+        return Rows.of, (self.view(np.ndarray), self.kind, self.wall_offset_ns)
+
     def __getitem__(self, wanted: Any) -> Any:
         found = super().__getitem__(wanted)
         return found.view(np.ndarray) if isinstance(found, Rows) and found.dtype.names is None else found

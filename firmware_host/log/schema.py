@@ -80,6 +80,9 @@ class RowKind:
         stamps = [offset for field, offset in zip(self.numbers, self.offsets, strict=True) if field.name == "stamp_s"]
         self._stamp_offset = stamps[0] if stamps else None
 
+    def __reduce__(self) -> Any:
+        return RowKind, (self.topic, self.schema_name, self.fields, self.definition, self.metadata)
+
     def _align(self) -> tuple[list[str], list[int]]:
         """Return the formats of `struct` with padding, and each field's position in the row."""
         formats, offsets, end = [], [], 0

@@ -1,6 +1,7 @@
 """The public package and the examples do what their documentation says."""
 
 import os
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -62,6 +63,13 @@ def test_ticks_become_a_table_with_a_column_for_each_joint(log: mudskipper.Opene
 def test_strides_and_events_become_tables(log: mudskipper.OpenedLog) -> None:
     assert log.strides.to_pandas().groupby("flipper", observed=True)["k_s"].count().to_dict() == {"left": 3, "right": 3}
     assert log.events.to_pandas()["text"].str.startswith("request walk").sum() == 1
+
+
+def test_a_log_and_its_replay_come_whole_from_another_process(log: mudskipper.OpenedLog) -> None:
+    came: mudskipper.OpenedLog = pickle.loads(pickle.dumps(log))
+    assert came.ticks.to_pandas().equals(log.ticks.to_pandas()) and str(came) == str(log)
+    replayed = mudskipper.replay(LOG)
+    assert repr(pickle.loads(pickle.dumps(replayed)).fits[0].k_p()) == repr(replayed.fits[0].k_p())
 
 
 def test_selected_rows_become_a_table_too_with_their_time(log: mudskipper.OpenedLog) -> None:
