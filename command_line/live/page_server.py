@@ -43,6 +43,7 @@ STOP_HEADER = "X-Mudskipper"
 ANSWER_S = 2.0  # of the daemon, whether it would take a stop
 ROWS = re.compile(r"/rows\?after=(-?\d{1,18})")
 STATUS_S = 0.8  # for which a status serves all pages
+IDLE_S = 30.0  # of a connection, which ends then: a phone that is out of reach closes none
 
 Values = dict[str, Any]
 
@@ -195,7 +196,7 @@ class _Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     """Answers one connection."""
 
-    protocol_version = "HTTP/1.1"
+    protocol_version, timeout = "HTTP/1.1", IDLE_S
     server: _Server
 
     def do_GET(self) -> None:

@@ -88,6 +88,12 @@ def test_a_page_that_is_behind_gets_the_robot_and_all_that_is_kept(page: PageSer
     assert "robot" not in ask(page, answer["number"])
 
 
+def test_a_browser_that_vanished_keeps_no_connection(page: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("command_line.live.page_server._Handler.timeout", 0.1)
+    with socket.create_connection((ADDRESS, page.port), timeout=10) as connection:
+        assert connection.recv(1) == b""
+
+
 @pytest.fixture
 def open_page(short_folder: Path) -> Iterator[PageServer]:
     server = PageServer("0.0.0.0", 0, short_folder / "no daemon", ["Robot.local"])
