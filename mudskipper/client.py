@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -72,7 +72,7 @@ class Client:
     def walk(
         self,
         strides: int = 0,
-        depth_m: float | Sequence[float] | None = None,
+        depth_m: float | Iterable[float] | None = None,
         gait: Gait | str | Path | None = None,
         **trial: object,
     ) -> None:
@@ -81,7 +81,7 @@ class Client:
         `gait` is a Gait, a gait file, or the name of one that ships; without it the robot walks its own.
         `trial` describes the walk in its log, a new one: mud, water, trial, operator, tags and note.
         """
-        depth = {"depths_m": list(depth_m)} if isinstance(depth_m, Sequence) else {"depth_m": depth_m}
+        depth = {"depths_m": list(depth_m)} if isinstance(depth_m, Iterable) else {"depth_m": depth_m}
         if gait is not None:
             trial["gait"] = (gait if isinstance(gait, Gait) else Gait(gait)).text
         self._move("walk", strides=strides, **depth, **_texts(trial))

@@ -84,7 +84,8 @@ class StatusClient:
         if len(params) > MOST_PARAMS or longest > LONGEST_ARRAY:  # for which the daemon closes the connection
             raise CallRefusedError(f"{method}: a request has {LONGEST}")
         self._number += 1
-        request = msgpack.packb([REQUEST, self._number, method, params], unicode_errors="backslashreplace")
+        message = [REQUEST, self._number, method, params]
+        request = msgpack.packb(message, default=plain, unicode_errors="backslashreplace")
         if len(request) > LONGEST_REQUEST:
             name = max(params, key=lambda key: len(str(params[key])))
             raise CallRefusedError(f"{name} = {params[name]!r:.40}... is too long: {TOO_LONG}")
@@ -131,6 +132,13 @@ class StatusClient:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def plain(value: Any) -> Any:
+    """Return a number or an array of numpy as Python's own. Raises TypeError for what no request can have."""
+    if not hasattr(value, "tolist"):
+        raise TypeError(f"no request has a {type(value).__name__}")
+    return value.tolist()
 
 
 def _connected(path: str, timeout_s: float) -> socket:

@@ -91,7 +91,7 @@ def load_law(target: str) -> tuple[Law, float]:
 def order_of(law: Law, closed: list[Report]) -> Report | None:
     """Call the law, and return its order for the strides to come. Raises LawError."""
     answer = _answer_of(law, closed)
-    if isinstance(answer, float):
+    if isinstance(answer, float) or hasattr(answer, "tolist"):  # one of numpy is no float
         return {"depth_m": answer}
     if answer is None or isinstance(answer, dict):
         return answer

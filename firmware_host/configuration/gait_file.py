@@ -40,7 +40,11 @@ def read_gait(document: dict[str, Any]) -> GaitPath:
 
 
 def as_json(document: dict[str, Any]) -> str:
-    return json.dumps(document, separators=(",", ":"), default=str)
+    return json.dumps(document, separators=(",", ":"), default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)  # of numpy, or a date of TOML
 
 
 def _protocol(name: str) -> GaitParameters:

@@ -3,6 +3,7 @@
 import doctest
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mudskipper
@@ -63,7 +64,7 @@ def test_a_gait_of_one_s_own_walks_and_is_checked_for_the_robot(bench: Bench) ->
         assert robot.wait_for("walking")["depth_m"] == 0.021
         robot.stop()
         robot.wait_for("hold")
-        robot.walk(2, depth_m=[0.022, 0.03])  # an array crosses the socket
+        robot.walk(2, depth_m=np.array([0.022, 0.03]))  # an array crosses the socket
         assert robot.wait_for("walking")["depth_m"] == 0.022
         robot.stop()
         robot.wait_for("hold")

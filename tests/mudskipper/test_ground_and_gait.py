@@ -32,6 +32,7 @@ def test_a_file_and_its_keys_as_keywords_are_the_same_value() -> None:
 def test_keywords_count_more_than_the_file_and_none_leaves_a_key_out() -> None:
     changed = Gait("ellipse", depths_m=(0.02, 0.03)).tables
     assert changed == Gait("ellipse").tables | {"depths_m": [0.02, 0.03]}
+    assert changed == Gait("ellipse", depths_m=np.array([0.02, 0.03])).tables
     level = Ground(WORLD, ridges=None).tables
     assert "ridges" not in level and level["stone"] == Ground(WORLD).tables["stone"]
     assert Ground(sand="generic", strength_pa=None).tables["segment"][0].keys() == {"start_m", "end_m", "sand"}

@@ -14,7 +14,7 @@ from command_line.errors import CommandError
 from command_line.operation import attended_walk, run
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
-from operator_client.status_client import CallRefusedError, StatusClient
+from operator_client.status_client import CallRefusedError, StatusClient, plain
 from tests.folders import ROOT
 
 LAWS = ROOT / "examples" / "laws"
@@ -39,8 +39,8 @@ class WalkOfTwoStrides(StatusClient):
         if method == "stride":
             if self._refusal:
                 raise CallRefusedError(self._refusal)
-            msgpack.packb(params)  # raises what the real client raises
-            self.orders.append(params)
+            packed = msgpack.packb(params, default=plain)  # raises what the real client raises
+            self.orders.append(msgpack.unpackb(packed, strict_map_key=False))
         self._stopped = self._stopped or method == "stop"
         return "accepted"
 
@@ -90,9 +90,10 @@ def law(folder: Path, body: str) -> str:
     [
         ("return 0.001 * strides[0]['number']", [{"depth_m": 0.01}, {"depth_m": 0.012}]),
         ("return {'depth_m': 0.03, 'sweep_angle_deg': 20.0}", [{"depth_m": 0.03, "sweep_angle_deg": 20.0}] * 2),
+        ("return __import__('numpy').float32(0.03125)", [{"depth_m": 0.03125}] * 2),
         ("return None", []),
     ],
-    ids=["a depth", "a depth and a sweep", "as before"],
+    ids=["a depth", "a depth and a sweep", "of numpy", "as before"],
 )
 def test_a_law_is_called_once_for_each_stride_that_closed(
     daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
