@@ -46,11 +46,16 @@ FIXED_OF_DRIVE = frozenset(  # by the configuration
         "torque_range_nm",
     }
 )
-GIVEN = FIXED_OF_DRIVE | {"encoder_counts", "encoder_direction", "watchdog_s"}  # as far as its type has them
+GIVEN = FIXED_OF_DRIVE | {  # as far as its type has them
+    "encoder_counts",
+    "encoder_direction",
+    "watchdog_s",
+    "heartbeat_period_s",
+}
 
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
-    """Return simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
+    """Return simulated drives with the configuration's ids, signs, zeros, models, heartbeats and torque constants."""
     return {
         joint: SimulatedDriveParameters(
             **({name: getattr(drive, name) for name in GIVEN if hasattr(drive, name)} | changes)

@@ -5,7 +5,9 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from simulation.devices.motion_capture_parameters import MotionCaptureParameters
+from simulation.harness.drive_presets import calibrated
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import LAB
@@ -58,3 +60,12 @@ def test_a_robot_walks_at_any_rate_and_at_its_own_with_everything_that_can_be_wr
         faults.update(fault.name for fault in lockstep.loop.faults.present)
     assert (lockstep.loop.mode, lockstep.loop.drives.refused_commands, faults) == (Mode.HOLD, 0, set())
     assert lockstep.robot.plant.body_m > 0.05
+
+
+def test_the_drives_send_their_heartbeats_at_the_configured_period(example_text: str) -> None:
+    """At twice the rate or more they would look like two drives with one id."""
+    node = "node_id = "
+    text = calibrated(example_text.replace(node, f"heartbeat_period_s = 0.5\n{node}"))
+    lockstep = Lockstep(parse_configuration(text), TRACK)
+    lockstep.run_for(3.0)
+    lockstep.arm()
