@@ -11,6 +11,7 @@ from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from drivers.can.mock_bus import MockBus
+from drivers.drive import DriveParameters
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from drivers.fault_injection.failing_port import failing_ports
@@ -56,12 +57,16 @@ GIVEN = FIXED_OF_DRIVE | {  # as far as its type has them
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Return simulated drives with the configuration's ids, signs, zeros, models, heartbeats and torque constants."""
-    return {
-        joint: SimulatedDriveParameters(
-            **({name: getattr(drive, name) for name in GIVEN if hasattr(drive, name)} | changes)
-        )
-        for joint, drive in configuration.drive.items()
-    }
+    return {joint: _drive_of(drive, changes) for joint, drive in configuration.drive.items()}
+
+
+def _drive_of(drive: DriveParameters, changes: Mapping[str, Any]) -> SimulatedDriveParameters:
+    """Return a drive whose motor has the calibrated torque constant, while it may state torque by another one."""
+    given = {name: getattr(drive, name) for name in GIVEN if hasattr(drive, name)}
+    known_nm_a = getattr(drive, "reported_constant_nm_a", drive.torque_constant_nm_a)
+    stronger = drive.torque_constant_nm_a / known_nm_a * (1.0 + changes.get("torque_constant_error", 0.0))
+    own = {"torque_constant_nm_a": known_nm_a, **changes, "torque_constant_error": stronger - 1.0}
+    return SimulatedDriveParameters(**(given | own))
 
 
 def plant_of(

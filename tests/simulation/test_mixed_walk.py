@@ -72,6 +72,13 @@ def test_the_mud_is_the_same_with_any_drives(types: tuple[str, str], mud: Mappin
     assert walked(text) == pytest.approx(dict(mud), rel=0.02)
 
 
+def test_a_calibrated_motor_whose_drive_knows_another_constant_feels_the_same_mud(mud: Mapping[str, float]) -> None:
+    known = "reported_constant_nm_a = 0.075\n"
+    text = with_drive_type(EXAMPLE, "mit").replace("node_id = ", f"{known}node_id = ")
+    found = walked(text)
+    assert [found[name] for name in ("k_p", "k_e")] == pytest.approx([mud[name] for name in ("k_p", "k_e")], rel=0.02)
+
+
 @pytest.mark.parametrize("model", ["AK80-9", "RS05"])
 def test_drives_whose_watchdog_is_proven_are_armed_without_force_and_walk(model: str, mud: Mapping[str, float]) -> None:
     text = with_drive_type(EXAMPLE, f"mit:{model}")
