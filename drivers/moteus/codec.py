@@ -150,7 +150,6 @@ def decode_power(data: bytes) -> float | None:
 
 def encode_reply(reply: Reply) -> bytes:
     a, b, c, d, e, f, nop = _REPLY_HEADS
-    temperature_c, torque_nm = reply.motor_temperature_c, reply.control_torque_nm
     return _REPLY.pack(
         a,
         reply.mode,
@@ -160,15 +159,20 @@ def encode_reply(reply: Reply) -> bytes:
         c,
         reply.q_current_a,
         d,
-        ABSENT if temperature_c != temperature_c else int(temperature_c),
+        _code(reply.motor_temperature_c, 127),
         e,
-        int(reply.voltage_v / VOLTAGE_V),
-        int(reply.board_temperature_c),
+        _code(reply.voltage_v / VOLTAGE_V, 127),
+        _code(reply.board_temperature_c, 127),
         reply.fault,
         f,
-        -32768 if torque_nm != torque_nm else int(torque_nm / TORQUE_NM),
+        _code(reply.control_torque_nm / TORQUE_NM, 32767),
         nop,
     )
+
+
+def _code(number: float, largest: int) -> int:
+    """Truncate and end at the largest code, as a drive does; NaN is the most negative one."""
+    return int(min(max(number, -largest), largest)) if number == number else -largest - 1
 
 
 def decode_reply(data: bytes) -> Reply:

@@ -143,7 +143,7 @@ class SimulatedMit(SimulatedDrive):
             self._measured_speed(),
             self._measured_nm(),
             parameters.temperature_c,
-            int(parameters.temperature_c) if model.has_registers else self.status & 0x7 if self.failed else 0,
+            int(max(parameters.temperature_c, 0.0)) if model.has_registers else self.status & 0x7 if self.failed else 0,
         )
         ranges = model._replace(torque_nm=self.registers[TMAX])
         return codec.encode_answer(answer, ranges)

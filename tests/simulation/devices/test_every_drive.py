@@ -29,6 +29,16 @@ def test_angle_velocity_and_torque_are_the_joint_s_whatever_the_sign_and_the_zer
 
 
 @each_type
+@pytest.mark.parametrize("changes", [{"temperature_c": -50.0}, {"temperature_c": 200.0}, {"bus_voltage_v": 100.0}])
+def test_a_temperature_or_voltage_beyond_its_codes_does_not_silence_a_drive(
+    name: str, changes: dict[str, float]
+) -> None:
+    drives = DrivenDrives(name, changes)
+    drives.tick(count=60)
+    assert drives.state.heartbeat_stamp_s > 10.0 and not drives.drives.malformed_frames
+
+
+@each_type
 def test_a_drive_follows_torque_only_while_it_is_armed(name: str) -> None:
     drives = DrivenDrives(name)
     drives.devices[0].receive(drives.devices[0].forge_torque(5.0), drives.now_s)  # of another program, and idle
