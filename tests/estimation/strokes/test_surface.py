@@ -207,12 +207,13 @@ def test_nothing_makes_the_search_raise(pairs: list[tuple[float, float]]) -> Non
     finish(find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs]))
 
 
-@given(st.lists(st.tuples(modest_depths, st.floats(-100.0, 100.0)), max_size=40))
+@given(st.lists(st.tuples(modest_depths, st.floats(-100.0, 100.0)), min_size=8, max_size=40))
 def test_a_surface_lies_where_the_flipper_was(pairs: list[tuple[float, float]]) -> None:
-    ordered = sorted(pairs)
-    surface = finish(find_surface([depth_m for depth_m, _ in ordered], [force_n for _, force_n in ordered]))
+    """The forces grow with the depth; in unordered ones no surface is ever found."""
+    depths_m, forces_n = (sorted(each) for each in zip(*pairs, strict=True))
+    surface = finish(find_surface(depths_m, forces_n))
     if surface.found:
-        assert ordered[0][0] <= surface.depth_m <= ordered[-1][0]
+        assert depths_m[0] - 1e-12 <= surface.depth_m <= depths_m[-1] + 1e-12
         assert surface.std_error_m >= 0.0
 
 
