@@ -46,8 +46,8 @@ def test_a_piece_has_the_weighted_mean_of_its_strides(rows: list[tuple[float, fl
     assert (piece.strides, piece.at_least) == (len(rows), False)
 
 
-def test_strides_that_differ_by_more_than_their_errors_widen_it_by_their_scatter() -> None:
-    factors = [0.5, 0.6, 1.5, 1.9]
+@pytest.mark.parametrize("factors", [(0.5, 1.9), (0.5, 0.6, 1.5, 1.9)])
+def test_strides_that_differ_by_more_than_their_errors_widen_it_by_their_scatter(factors: tuple[float, ...]) -> None:
     piece = only(mapped(*(stride(k_s=reported(1e6 * factor)) for factor in factors)))
     scatter = float(np.std(np.log(factors), ddof=1)) / sqrt(len(factors))
     assert piece.std_error / piece.value == pytest.approx(scatter)
