@@ -77,18 +77,9 @@ def test_an_ellipse_forward_or_backward_gives_the_coefficients_of_the_mud(direct
             assert abs(estimate.value - truth) < 2.0 * estimate.std_error
 
 
-def test_the_parts_of_a_crutching_stride_are_found_without_their_names() -> None:
-    named = list(strides_of(walked(strides=3)))
-    found = list(strides_of([moment._replace(phase=Phase.STROKE) for moment in walked(strides=3)]))
-    assert len(found) >= len(named) - 1
-    for by_name, by_motion in zip(named[1:], found[1:], strict=False):
-        for k in ("k_p", "k_s", "k_e"):
-            one, other = getattr(by_name, k), getattr(by_motion, k)
-            assert abs(one.value - other.value) < one.std_error, k
-
-
-def test_a_pause_within_a_path_ends_none_of_its_parts() -> None:
-    moments = walked(gait=GaitParameters(pause_s=0.3), strides=3)
+@pytest.mark.parametrize("pause_s", [0.0, 0.3])
+def test_the_parts_of_a_crutching_stride_are_found_without_their_names_and_a_pause_ends_none(pause_s: float) -> None:
+    moments = walked(gait=GaitParameters(pause_s=pause_s), strides=3)
     named = list(strides_of(moments))
     found = list(strides_of([m if m.phase is Phase.PAUSE else m._replace(phase=Phase.STROKE) for m in moments]))
     assert len(found) >= len(named) - 1

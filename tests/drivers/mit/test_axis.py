@@ -177,13 +177,6 @@ def test_an_answer_is_read_as_its_drive_s_wherever_it_is_heard(model: str, ident
     assert (content.node_id, content.is_command, content.signals) == (NODE, False, SIGNALS)
 
 
-def test_another_program_that_stops_a_cubemars_is_believed() -> None:
-    bench = Bench(CUBEMARS)
-    bench.enter()
-    bench.hear(NODE, codec.LEAVE)
-    assert not bench.answer().closed_loop
-
-
 @pytest.mark.parametrize(
     ("node_id", "kind", "foreign"),
     [(NODE, codec.WRITE, 1), (NODE, codec.STORE, 1), (NODE, codec.READ, 0), (NODE + 1, codec.WRITE, 0)],
@@ -249,12 +242,12 @@ def test_an_answer_under_its_id_that_another_drive_sent_is_refused() -> None:
         bench.hear(codec.feedback_id(NODE, bench.model), data)
 
 
-@pytest.mark.parametrize("data", [codec.CLEAR, codec.ENTER])
-def test_only_the_command_to_leave_ends_what_a_cubemars_follows(data: bytes) -> None:
+@pytest.mark.parametrize("data", [codec.LEAVE, codec.CLEAR, codec.ENTER])
+def test_of_another_program_only_the_command_to_leave_ends_what_a_cubemars_follows(data: bytes) -> None:
     bench = Bench(CUBEMARS)
     bench.enter()
     bench.hear(NODE, data)
-    assert bench.answer().closed_loop
+    assert bench.answer().closed_loop is (data != codec.LEAVE)
 
 
 def test_a_damiao_that_has_not_entered_the_mode_yet_is_still_to_follow() -> None:
