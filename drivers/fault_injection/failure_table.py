@@ -147,7 +147,7 @@ def _signal(
         *_by_daemon(part, "off", f"its {name} does not arrive", *off),
         *_by_daemon(part, "stuck", f"its {name} is frozen while messages keep arriving", *stuck),
         *_degraded(part, "garbage", f"its {name} is random, not a number, huge, or of a wrong length"),
-        *_degraded(part, "slow", f"its {name} arrives 5 to 20 ms late"),
+        *_degraded(part, "slow", f"messages with its {name} arrive 5 to 20 ms late"),
         *_degraded(part, "intermittent", f"half of the messages of its {name} are lost, at random"),
     ]
 
