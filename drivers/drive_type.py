@@ -19,11 +19,11 @@ from drivers.transmit_gate import FrameKind, GateTable
 
 
 class Span(NamedTuple):
-    """Where a signal stands in a payload that contains several, and its bytes where the drive does not know it."""
+    """Where a signal stands in a payload, and its bytes where the drive does not know it; None: it sends no message."""
 
     begin: int
     end: int
-    absent: bytes
+    absent: bytes | None
 
 
 class FrameContent(NamedTuple):

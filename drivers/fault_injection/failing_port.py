@@ -9,9 +9,8 @@ a dictionary.
 import errno
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from math import inf
-from operator import attrgetter
 from random import Random
 from struct import Struct
 
@@ -45,9 +44,9 @@ ONE_FLOAT = Struct("<f")
 class DelayLine:
     """Delays frames. A frame never overtakes another one with the same key."""
 
-    def __init__(self, key: Callable[[Frame], int]) -> None:
+    def __init__(self, key: Callable[[Frame], Hashable]) -> None:
         self._key = key
-        self.waiting: dict[int, deque[tuple[float, Frame]]] = {}
+        self.waiting: dict[Hashable, deque[tuple[float, Frame]]] = {}
 
     def put(self, frame: Frame, arrival_s: float) -> None:
         line = self.waiting.setdefault(self._key(frame), deque())
@@ -78,7 +77,7 @@ class FailingPort:
         joints = {drive.node_id: joint for joint, drive in self._drives.items()}
         self._joints = joints
         self._listeners = {node_id: (self._bus, joint, f"{joint}.command") for node_id, joint in joints.items()}
-        self._incoming, self._outgoing = DelayLine(attrgetter("arbitration_id")), DelayLine(self._node_id)
+        self._incoming, self._outgoing = DelayLine(self._report), DelayLine(self._node_id)
         self._frozen: dict[tuple[str, int], tuple[Failure, bytes]] = {}
         self._refused_sends = self._forged_error_frames = 0
         self.last_send_error = ""
@@ -144,6 +143,11 @@ class FailingPort:
             return (self._bus,), None
         return (self._bus, SUPPLY, joint, *(f"{joint}.{signal}" for signal in content.signals)), content
 
+    def _report(self, frame: Frame) -> Hashable:
+        """Return the id and what a drive reports under it: a Damiao's answers and registers have the same id."""
+        content = self._content(frame)
+        return frame.arbitration_id, content and content.signals
+
     def _content(self, frame: Frame) -> FrameContent | None:
         return read_frame(frame, self._drives.values())
 
@@ -173,12 +177,14 @@ class FailingPort:
             frame = frame if data is frame.data else frame._replace(data=data)
         return frame
 
-    def _with_failed_span(self, frame: Frame, failure: Failure, span: Span) -> bytes:
-        """Change one signal of a payload that contains several."""
+    def _with_failed_span(self, frame: Frame, failure: Failure, span: Span) -> bytes | None:
+        """Change one signal of a payload; return None where that loses the frame."""
         data, own = frame.data, frame._replace(data=frame.data[span.begin : span.end])
         changed = self._after_failure(own, failure, of_bus=False)
         if changed is None:
             changed = span.absent
+        if changed is None:
+            return None
         changed = changed.ljust(len(own.data), b"\0")[: len(own.data)]
         return data[: span.begin] + changed + data[span.end :]
 

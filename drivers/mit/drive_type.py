@@ -19,6 +19,7 @@ from drivers.mit.settings import SUPPLY_V
 ROTOR_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(7, 8, bytes(1))}  # of a Damiao
 DRIVE_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(6, 7, bytes(1))}  # of a CubeMars
 WIDE_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(6, 8, bytes(2))}  # of a RobStride
+VOLTAGE: Mapping[str, Span] = {"voltage": Span(4, 8, None)}  # the value of a Damiao's register
 SIGNALS = ("position", "current", "heartbeat", "error", "temperature")
 DAMIAO_OFFSET = 16  # of the id under which a Damiao answers
 OVERCURRENT = 0xA  # of a Damiao; its low bits are that of a CubeMars
@@ -80,7 +81,7 @@ class Mit(DriveType):
         if identifier < DAMIAO_OFFSET and data[:1] != bytes([node_id]):
             return FrameContent(node_id, is_command=True)
         if identifier > DAMIAO_OFFSET and codec.is_register_answer(data, node_id):
-            return FrameContent(node_id, signals=("voltage",) * (data[3] == SUPPLY_V))
+            return FrameContent(node_id, signals=("voltage",) * (data[3] == SUPPLY_V), spans=VOLTAGE)
         of_damiao = identifier > DAMIAO_OFFSET
         return FrameContent(node_id, signals=SIGNALS, spans=ROTOR_TEMPERATURE if of_damiao else DRIVE_TEMPERATURE)
 

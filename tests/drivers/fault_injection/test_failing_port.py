@@ -13,6 +13,10 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.can.port_health import BusState
 from drivers.fault_injection.failing_port import FailingPort
 from drivers.fault_injection.failures import Failures
+from drivers.mit import codec as mit
+from drivers.mit.drive_type import Mit
+from drivers.mit.parameters import MitParameters
+from drivers.mit.settings import FLOAT, SUPPLY_V
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, arbitration_id
 from drivers.odrive.parameters import OdriveParameters as DriveParameters
@@ -211,6 +215,30 @@ def test_a_slow_signal_is_whole_in_order_late_and_stamped_when_it_came(component
     delays = [late - tick for (late, _), (tick, _) in zip(frames, sound, strict=True)]
     assert max(delays) * PERIOD_S <= 0.02 + PERIOD_S and sum(delays) > 3 * TICKS
     assert all(stamp_s == now_s for now_s, stamp_s in seen.stamps_s)
+
+
+@pytest.mark.parametrize("kind", ["off", "stuck", "garbage", "slow", "intermittent"])
+def test_a_failing_voltage_of_a_damiao_leaves_its_answers_under_the_same_id_alone(kind: str) -> None:
+    bus, failures = MockBus(), Failures(("left",))
+    robot, port = bus.open(), FailingPort("left", bus.open(), {JOINTS[0]: MitParameters("left", 1)}, failures)
+    answer = Mit().announces(1)
+    voltage = answer._replace(data=mit.encode_register(1, mit.READ, SUPPLY_V, FLOAT.pack(24.0)))
+    failures.update(0.0)
+    assert failures.begin(f"{JOINTS[0]}.voltage", kind, 0.0) is None
+    payloads: list[bytes] = []
+    for tick in range(100):
+        failures.update(tick * PERIOD_S)
+        robot.send(voltage)
+        robot.send(answer)
+        received = [frame.data for frame in port.receive()]
+        assert received.count(answer.data) == 1 and {data[:4] for data in received} <= {
+            answer.data[:4],
+            voltage.data[:4],
+        }
+        payloads += received
+    values = [data for data in payloads if data != answer.data]
+    assert (len(values) < 100) is (kind in ("off", "slow", "intermittent"))
+    assert (set(values) <= {voltage.data}) is (kind != "garbage")
 
 
 def test_garbage_is_of_every_sort() -> None:
