@@ -154,10 +154,10 @@ class Arm:
         self.ground = ground if firmness == 1.0 else ground.scaled(firmness)
 
     def _meet_stones(self, stones: StoneContact, dt_s: float, edge_m: float, attitude: Attitude) -> None:
-        geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
+        geometry, sweep_rad = self.parameters.geometry, self.sweep_rad
         push = stones.step(dt_s, edge_m, lowest_point_m(attitude, self.contact.size))
         if push is not NO_PUSH:
-            pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
+            pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, attitude, push))
             self.force = ContactForce(*map(add, self.force, pushed))
 
     def _load_nm(self) -> tuple[float, float]:

@@ -22,7 +22,8 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from simulation.mud.rigid_plate import Wrench
+from simulation.mud.grounds.sand import added, along, horizontal
+from simulation.mud.rigid_plate import Attitude, Wrench
 
 STIFFNESS_N_M = 20e3
 DAMPING_N_S_M = 15.0
@@ -60,18 +61,18 @@ class Push(NamedTuple):
 NO_PUSH = Push(0.0, 0.0)
 
 
-def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, push: Push) -> Wrench:
-    """Resolve F_x forward on the middle of the lower edge and F_z upward on its lower corner along the plate:
+def push_wrench(geometry: FlipperGeometry, sweep_rad: float, attitude: Attitude, push: Push) -> Wrench:
+    """Resolve F_x forward on the middle of the lower edge and F_z upward on its lowest corner along the plate.
+
+    Both are directions of the world. Of a body that is upright
 
     F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
     """
-    sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-    corner_m, height_m = max(geometry.plate.corners, key=lambda corner: -ca * sb * corner[0] - cb * corner[1])
-    upright_n, upward_n, across_n = -push.upward_n * sa * sb, push.upward_n * cb, push.upward_n * ca * sb
+    ahead = horizontal(attitude.up, (cos(sweep_rad), sin(sweep_rad), 0.0))
+    corner_m, height_m = max(geometry.plate.corners, key=lambda corner: attitude.depth_at_m(*corner))
+    upright_n, across_n, upward_n = lift = along(attitude.up, push.upward_n)
     return Wrench(
-        push.forward_n * ca + upright_n,
-        push.forward_n * sa + across_n,
-        upward_n,
+        *added(along(ahead, push.forward_n), lift),
         normal_outward_nm=upright_n * corner_m,
         normal_upward_nm=upright_n * height_m,
         outward_upward_nm=across_n * height_m,

@@ -8,7 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from simulation.mud.flipper_contact import contact_force
+from simulation.body.free_body import axes_of, own_axes
+from simulation.mud.carriage import Carriage, plate_directions
+from simulation.mud.flipper_contact import attitude_of, contact_force
+from simulation.mud.grounds.sand import added, along
 from simulation.mud.stones import NO_PUSH, STIFFNESS_N_M, Push, Stone, StoneContact, push_wrench
 
 DT_S = 0.001
@@ -78,7 +81,8 @@ def test_a_push_works_on_the_edge_s_middle_forward_and_on_its_lower_corner_upwar
 ) -> None:
     """The reference is virtual work: a point further outward is the middle of the edge of a longer arm."""
     assume(abs(adduction_rad) > 1e-3)  # at a level edge neither corner is the lower one
-    wrench = push_wrench(GEOMETRY, sweep_rad, adduction_rad, Push(forward_n, upward_n))
+    attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad)
+    wrench = push_wrench(GEOMETRY, sweep_rad, attitude, Push(forward_n, upward_n))
     force = contact_force(GEOMETRY, sweep_rad, wrench)
     power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s
     corners = [replace(GEOMETRY, flipper_length_m=0.12 + sign * GEOMETRY.plate_width_m / 2.0) for sign in (1.0, -1.0)]
@@ -87,3 +91,18 @@ def test_a_push_works_on_the_edge_s_middle_forward_and_on_its_lower_corner_upwar
     forward_m_s = at_middle.x_sweep * sweep_rad_s + at_middle.x_adduction * adduction_rad_s + body_m_s
     upward_m_s = at_corner.z_sweep * sweep_rad_s + at_corner.z_adduction * adduction_rad_s
     assert power_w == pytest.approx(forward_n * forward_m_s + upward_n * upward_m_s, abs=1e-9)
+
+
+angles = st.floats(-0.6, 0.6)
+
+
+@given(angles, angles, angles, angles, st.sampled_from([1.0, -1.0]))
+def test_a_stone_pushes_along_the_world_s_directions_a_body_that_rolls_and_pitches(
+    sweep_rad: float, adduction_rad: float, roll_rad: float, pitch_rad: float, side: float
+) -> None:
+    forward, _, up = own_axes(axes_of(roll_rad, pitch_rad), side)
+    carriage = Carriage(0.0, up, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    attitude = attitude_of(GEOMETRY, sweep_rad, adduction_rad, carriage=carriage)
+    forces_n = push_wrench(GEOMETRY, sweep_rad, attitude, Push(-3.0, 5.0))[:3]
+    push_n = added(*map(along, plate_directions(sweep_rad, adduction_rad), forces_n))
+    assert push_n == pytest.approx(added(along(forward, -3.0), along(up, 5.0)), abs=1e-9)
