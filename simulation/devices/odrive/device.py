@@ -126,7 +126,7 @@ class SimulatedOdrive(SimulatedDrive):
         elif command == codec.SET_VEL_GAINS.command:
             (self._velocity_gain_nm_s_turn,) = finite(codec.SET_VEL_GAINS.decode_padded(data)[:1])
         elif command == codec.CLEAR_ERRORS.command:
-            self.errors = 0
+            self.errors = self.disarm_reason = 0
         elif command == codec.ESTOP.command:
             self._disarm(self.estop_flag)
         elif command == codec.REBOOT.command:

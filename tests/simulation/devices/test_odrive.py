@@ -10,6 +10,8 @@ import pytest
 
 from drivers.can.frames import Frame
 from drivers.odrive.codec import (
+    CLEAR_ERRORS,
+    ERROR_ESTOP,
     ERROR_INITIALIZING,
     ESTOP,
     GET_BUS_VOLTAGE_CURRENT,
@@ -172,6 +174,14 @@ def test_commands_that_are_too_short_and_of_no_number_change_nothing(message: Me
     assert torque_nm(drive, 0.25) == 0.25
     drive.receive(Frame(arbitration_id(NODE, message), bytes(size)), 0.0)
     assert drive.torque_nm(0.0) == torque_nm(drive, nan) == 0.25
+
+
+def test_clearing_errors_also_clears_the_reason_of_the_disarming() -> None:
+    drive = make_armed_drive()
+    report(drive, ESTOP)
+    assert ask(drive, GET_ERROR) == (ERROR_ESTOP, ERROR_ESTOP)
+    report(drive, CLEAR_ERRORS, 0)
+    assert ask(drive, GET_ERROR) == (0, 0)
 
 
 @pytest.mark.parametrize(("volts", "flag"), [(10.4, 0x200), (10.6, 0), (59.9, 0), (60.1, 0x100)])
