@@ -75,7 +75,7 @@ def _cause(identity: str, faults: Sequence[Fault], cause_lines: Mapping[Fault, s
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
     if unheard:
         reported_as_well = (fault.message for fault in faults[:MESSAGES_PER_LINE])
-        return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING) | {"mandatory": True}
+        return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING)
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
     reported = (blocking or list(faults))[:MESSAGES_PER_LINE]
     messages = " ".join(fault.message for fault in reported)

@@ -11,6 +11,7 @@ from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.arming_checks import arming_checks
+from firmware_host.sockets.socket_methods import METHODS
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -92,6 +93,7 @@ def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) 
 def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) -> None:
     line = lines_of(ready, warnings=("no real-time priority",))["realtime"]
     assert (line["ok"], line["warning"], line["text"]) == (True, True, "no real-time priority")
+    assert line.keys() == METHODS["check"].answer_keys.keys() and not line["mandatory"]
 
 
 def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configuration: Configuration) -> None:
