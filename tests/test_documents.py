@@ -11,6 +11,7 @@ import tomlkit
 from command_line.init.key_reference import configuration_keys
 from command_line.json_output import SCHEMAS
 from docs.generate.pages import TABLES, sections
+from drivers.drive_types import DRIVE_TYPES
 from experiments.study.catalogue import study_texts
 from firmware_host.configuration.loading import parse_configuration
 from tests.folders import EXAMPLE_CONFIGURATION, ROOT
@@ -34,6 +35,9 @@ def test_every_generated_table_has_lines_and_the_configuration_all_keys() -> Non
     texts = {name: "\n".join(lines()) for name, lines in TABLES.items()}
     assert all(text.count("\n") > 5 for text in texts.values())
     assert all(f"| `{key.name}` |" in texts["configuration"] for key in configuration_keys())
+    for drive_type in DRIVE_TYPES.values():
+        keys = configuration_keys(drive_type.parameters, "drive.NAME")
+        assert all(f"{key.name}` |" in texts["configuration"] for key in keys)
 
 
 NEEDED = {"safety": {"motion": {"longest_hold_s": 1800.0}}}  # by an example: the bound for which it gives a reason

@@ -15,6 +15,7 @@ from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
 from docs.generate.command_line import commands, exit_statuses
 from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.gait_file import PROTOCOLS, SHIPPED
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
@@ -24,6 +25,7 @@ EXAMPLE = Path(__file__).parents[2] / "systemd" / "mudskipper.toml"
 SECTION = re.compile(r"^(?=\[)", re.MULTILINE)
 COMMENTED = re.compile(r"^# (?=\[|\w+ =)", re.MULTILINE)  # sections and keys
 COMMENTS_OF_NEXT = re.compile(r"(\n(#.*)?)*\Z")
+KEY_HEAD = ("key", "unit", "bounds", "default", "meaning")
 TOML_VALUES = (bool, int, float, str, tuple)
 RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
 
@@ -36,15 +38,29 @@ def sections() -> Iterator[str]:
         if section == "gait":
             names = " or ".join(f'"{name}"' for name in PROTOCOLS)
             rows.insert(0, (code("protocol"), "", names, '`"walking"`', "preset that the other keys change"))
-        yield from table(("key", "unit", "bounds", "default", "meaning"), rows)
+        yield from table(KEY_HEAD, rows)
         yield from ("", "```toml", example(section, keys), "```", "")
+        if section == "drive.NAME":
+            yield from other_drives()
+
+
+def other_drives() -> Iterator[str]:
+    """Yield, for each other type of drive, the keys that it lacks and those that differ from the default type's."""
+    keys_of = {name: list(configuration_keys(each.parameters, "drive.NAME")) for name, each in DRIVE_TYPES.items()}
+    usual = keys_of.pop(DEFAULT)
+    for name, keys in keys_of.items():
+        names = {key.name for key in keys}
+        absent = ", ".join(code(key.name) for key in usual if key.name not in names)
+        yield f'`type = "{name}"` has other keys{f", and no {absent}" if absent else ""}:'
+        own = [key for key in keys if key not in usual and key.name != "type"]
+        named = [key._replace(name=f"{key.section}.{key.name}".removeprefix("drive.NAME.")) for key in own]
+        yield from table(KEY_HEAD, map(_key_row, named))
 
 
 def gaits() -> Iterator[str]:
-    head = ("key", "unit", "bounds", "default", "meaning")
     for record, place in ((GaitPath, "the file"), (GaitPhase, "each `[[phase]]`"), (WayPoint, "each of `way_points`")):
         yield f"Keys of {place}:"
-        yield from table(head, map(_key_row, configuration_keys(record, place)))
+        yield from table(KEY_HEAD, map(_key_row, configuration_keys(record, place)))
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED.glob("*.toml"))}
     first_lines = [(code(name), text.splitlines()[0].lstrip("# ")) for name, text in texts.items()]
     yield from table(("gait", "what it is"), first_lines)
