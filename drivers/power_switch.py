@@ -5,6 +5,7 @@ readings in a row count as a cut, and the power is back after RELEASED_S without
 more counts as a cut. The packages `gpiod` and `evdev` are needed only by a robot that has such an input.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -15,7 +16,7 @@ from drivers.input_keys import InputKeys
 
 READ_S = 0.01  # between two readings
 RELEASED_S = 0.2  # a contact bounces for some 10 ms
-INSTALL = "pip install 'mudskipper[inputs]'"
+INSTALL = f"'{sys.executable} -m pip install gpiod evdev-binary'"  # mudskipper at PyPI is another project
 
 
 @dataclass(frozen=True)
