@@ -48,7 +48,9 @@ class NewRobot(NamedTuple):
 
 
 def drive_keys(drive_type: str) -> list[Key]:
-    return list(configuration_keys(DRIVE_TYPES[drive_type].parameters, "drive.NAME"))
+    """Return the keys of a drive's own table, in which its records have tables of their own."""
+    keys = configuration_keys(DRIVE_TYPES[drive_type].parameters, "drive.NAME")
+    return [key for key in keys if key.section == "drive.NAME"]
 
 
 def new_file(robot: NewRobot) -> str:

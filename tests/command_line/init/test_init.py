@@ -63,6 +63,11 @@ def test_drives_that_are_asked_get_the_gains_for_answers_of_a_tick_ago(drive: st
     assert gains == (GAINS_OF_ASKED_DRIVES if asked else JointGains())
 
 
+def test_the_comment_of_a_drive_s_key_is_not_that_of_a_proof() -> None:
+    text = new_file(NewRobot(drive_type="mit"))
+    assert "# on that bus (id, 1 to 15)" in text and "that was tried" not in text
+
+
 def test_without_a_terminal_nothing_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "-", "--name", "mudcat"]) == exit_codes.OK
     assert parse_configuration(capsys.readouterr().out).robot.name == "mudcat"
