@@ -95,7 +95,11 @@ def disarm(*, socket: Socket) -> Answer:
 
 
 def _end(command: str, socket: Socket) -> Answer:
-    ended = end_motion(socket, command)
+    try:
+        ended = end_motion(socket, command)
+    except KeyboardInterrupt:
+        complain(TORQUE_UNKNOWN)
+        raise
     if ended.status != exit_codes.OK:
         complain(ended.text, TORQUE_UNKNOWN)
     return mode_answer(command, ended.mode, ended.notice, ended.status)

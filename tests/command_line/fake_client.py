@@ -22,7 +22,7 @@ class FakeClient(StatusClient):
     def call(self, method: str, /, **params: Any) -> Any:
         self.calls.append(f"{method} {params.get('depth_m', '')}".strip())
         answer = self.answer(method)
-        if isinstance(answer, Exception):
+        if isinstance(answer, BaseException):
             raise answer
         return answer
 

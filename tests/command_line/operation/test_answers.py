@@ -98,6 +98,13 @@ def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
     assert answer.startswith(TORQUE_UNKNOWN) and "left_adduction" in answer
 
 
+@pytest.mark.parametrize("command", ["stop", "disarm"])
+def test_a_stop_that_is_interrupted_is_not_confirmed(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, next_of(KeyboardInterrupt()))
+    ended = run(command)
+    assert ended.returncode == exit_codes.INTERRUPTED and TORQUE_UNKNOWN in ended.stderr
+
+
 # a user who may stop the robot, and nothing else
 
 
