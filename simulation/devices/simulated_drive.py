@@ -128,7 +128,12 @@ class SimulatedDrive(ABC):
     def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
         """Return the messages that arrive by now."""
         frames = self._due_frames(now_s) if now_s >= self._next_due_s else ()
-        return self._delayed(frames, now_s) if self.parameters.message_delay_s else frames
+        return self._delayed(frames, now_s) if self._is_late else frames
+
+    @property
+    def _is_late(self) -> bool:
+        """Return whether messages are late, or follow such that have not arrived yet."""
+        return bool(self.parameters.message_delay_s or self._in_transit or self._given)
 
     def _delayed(self, frames: Iterable[Frame], now_s: float) -> Iterator[Frame]:
         """Yield the frames that arrive by now, stamped with the time of arrival; none overtakes another."""
@@ -147,7 +152,7 @@ class SimulatedDrive(ABC):
 
     def _send(self, answer: Frame) -> list[Frame]:
         """Return an answer that arrives at once; a late one becomes one of the cyclic frames."""
-        if not self.parameters.message_delay_s:
+        if not self._is_late:
             return [answer]
         self._given.append(answer)
         return []

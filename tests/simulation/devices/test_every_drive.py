@@ -144,3 +144,18 @@ def test_late_and_repeated_values_are_of_the_past_and_the_newest_one_is_last(nam
     assert angles_rad == sorted(angles_rad)
     assert -0.005 < min(ages_s) < 0.02 < max(ages_s) < 0.1  # the age of repeated values is not bounded
     assert not drives.drives.malformed_frames
+
+
+@each_type
+def test_a_message_that_was_late_does_not_come_with_the_next_ones_that_are(name: str) -> None:
+    drives, oldest_s = DrivenDrives(name), 0.0
+    drives.arm()
+    start_s = drives.now_s
+    for delay_s, ticks in ((0.02, 50), (0.0, 100), (0.02, 50)):
+        for device in drives.devices:
+            device.parameters = replace(device.parameters, message_delay_s=delay_s)
+        for _ in range(ticks):
+            drives.devices[0].measure(0.1 * (drives.now_s - start_s), 0.1)
+            drives.tick(0.0)
+            oldest_s = max(oldest_s, drives.now_s - start_s - drives.state.angle_rad / 0.1)
+    assert oldest_s < 0.04
