@@ -161,6 +161,7 @@ class SimulatedDrive(ABC):
         """Return the values of a message; in a fraction of all, at random, they are those of the one before."""
         fraction = self.parameters.repeated_fraction
         if not fraction:
+            self._repeated.clear()
             return encode()
         if message not in self._repeated or self._random.random() >= fraction:
             self._repeated[message] = encode()

@@ -217,7 +217,7 @@ class SimulatedOdrive(SimulatedDrive):
         return torque_nm
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
-        due_s, repeats = self._due_s, self.parameters.repeated_fraction
+        due_s = self._due_s
         for index, message_due_s in enumerate(due_s):
             if now_s < message_due_s:
                 continue
@@ -227,7 +227,7 @@ class SimulatedOdrive(SimulatedDrive):
                 due_s[index] = now_s + period_s
             for message in messages:
                 encode = self._payloads[message]
-                payload = self._new_or_repeated(message, encode) if repeats and message in REPEATED else encode()
+                payload = self._new_or_repeated(message, encode) if message in REPEATED else encode()
                 yield Frame(self._ids[message], payload, stamp_s=now_s)
         self._next_due_s = min(due_s)
 
