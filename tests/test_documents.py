@@ -23,6 +23,14 @@ def test_local_links_lead_to_files(name: str) -> None:
     assert [link for link in links if not (ROOT / link).exists()] == []
 
 
+def test_no_text_asks_pip_for_the_package_by_its_name() -> None:
+    """The package of that name on PyPI is another project's."""
+    asks = re.compile(r"pip install (-\S+ )*[\"']?mudskipper\b(?!/)")
+    found = [path.relative_to(ROOT) for kind in ("md", "py") for path in ROOT.glob(f"*/**/*.{kind}")]
+    ours = [path for path in found if path.parts[0] not in (".venv", "build")]
+    assert [path for path in ours if asks.search((ROOT / path).read_text(encoding="utf-8"))] == []
+
+
 def test_the_reference_describes_every_json_shape() -> None:
     text = (ROOT / "docs" / "reference" / "json.md").read_text(encoding="utf-8")
     headings = {*re.findall(r"^## ([\w-]+)/(\d+)$", text, re.MULTILINE), ("experiment-NAME", "1")}

@@ -11,6 +11,7 @@ import errno
 import os
 import re
 import select
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -130,7 +131,7 @@ def open_serial(path: str, baud: int) -> Any:
     try:
         import serial
     except ModuleNotFoundError:
-        raise SerialLineError("a serial port needs pyserial: pip install 'mudskipper[serial]'") from None
+        raise SerialLineError(f"a serial port needs pyserial: {sys.executable} -m pip install pyserial") from None
     try:
         return serial.Serial(path, baud, timeout=0, exclusive=True)
     except (OSError, ValueError) as problem:  # SerialException is an OSError

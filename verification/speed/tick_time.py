@@ -110,7 +110,7 @@ def measure(
     if bus and bus not in BUSES:
         raise SystemExit(f"--bus {bus}: must be one of {', '.join(BUSES)}")
     if picture and not find_spec("matplotlib"):
-        raise SystemExit("--picture needs matplotlib: pip install 'mudskipper[plots]'")
+        raise SystemExit("--picture needs matplotlib: 'make setup' installs it")
     if against:
         report = compare_trees(Path(against), pairs)
         return evaluated(report, "no slower than the other tree", report["ratio"] <= 1.0 + (report["std_error"] or 0.0))
