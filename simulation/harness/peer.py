@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.can.bus_lock import BusRole
+from drivers.can.bus_lock import BusRole, BusTakenError
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -122,7 +122,9 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
     except ConfigurationError as problem:
         return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
     except BusError as problem:
-        return _refuse(f"{problem}. 'mudskipper simulate --config FILE --local' needs none of its interfaces")
+        taken = isinstance(problem.__cause__, BusTakenError)
+        remedy = "--bus NAME' makes another robot" if taken else "--config FILE --local' needs none of its interfaces"
+        return _refuse(f"{problem}. 'mudskipper simulate {remedy}")
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
     take_precedence()

@@ -168,6 +168,7 @@ def test_a_second_simulated_robot_leaves_the_first_one_and_its_files_alone(
     assert main(["simulate", "--bus", "twice"]) == 1
     printed = capsys.readouterr()
     assert printed.out == "" and f"process {os.getpid()} simulates" in printed.err
+    assert "--bus" in printed.err and "--local" not in printed.err
     assert not (named_folder("twice") / "mudskipper.toml").exists()
     locks.close()
     assert main(["simulate", "--bus", "twice"]) == exit_codes.OK
