@@ -1,7 +1,7 @@
 """How the coefficients of a mud change with depth: walks at several depths in turn, and the exponent m of k ∝ z^m.
 
-On a robot, `mudskipper walk --depth 2 --depth 3 --depth 4` and `mudskipper log report` do the same. An exponent of -2
-of k_s is a force that does not depend on the depth: firm mud, in which the motors give way before it does.
+On a robot, `mudskipper walk --depth 2 --depth 3 --depth 4` and `mudskipper experiment lablogs` do the same. An exponent
+of -2 of k_s is a force that does not depend on the depth: firm mud, in which the motors give way before it does.
 """
 
 from typing import Annotated, Any
