@@ -106,11 +106,14 @@ def _muds(log: Log, walks: Sequence[Ticks]) -> list[MudEntry]:
         [stride for stride in log.strides if begin_s <= stride["stamp_s"] < end_s]
         for begin_s, end_s in pairwise([-inf, *borders_s, inf])
     ]
-    return [_mud(strides, walks) for strides in groups if strides]
+    muds: list[Rows] = [*filter(None, groups), []]
+    return [_mud(strides, following, walks) for strides, following in pairwise(muds)]
 
 
-def _mud(strides: Rows, walks: Sequence[Ticks]) -> MudEntry:
-    begin_s, end_s = min(stride["t_start_s"] for stride in strides), max(stride["stamp_s"] for stride in strides)
+def _mud(strides: Rows, following: Rows, walks: Sequence[Ticks]) -> MudEntry:
+    """A stride lasts from its insertion to the next one; the last of the log has no duration."""
+    starts_s, ends_s = ([stride["t_start_s"] for stride in rows] for rows in (strides, following))
+    begin_s, end_s = min(starts_s), min(ends_s, default=max(starts_s))
     there = [walk[(walk["stamp_s"] >= begin_s) & (walk["stamp_s"] <= end_s)] for walk in walks]
     medians = {name: _median(strides, name) for name in COEFFICIENTS}
     return MudEntry(strides=len(strides), speed_m_s=_travel(there)[1], **medians)

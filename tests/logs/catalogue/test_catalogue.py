@@ -3,16 +3,19 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 
 import duckdb
 import pytest
 
-from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_file import EXPORTED, LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from logs.catalogue import catalogue as catalogue_module
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, CatalogueError, catalogue_path
 from logs.catalogue.entry import LogEntry
+from logs.catalogue.log_contents import entry_of_log
 from logs.files.log_error import unwatched
+from logs.files.log_reader import read_log
 from logs.files.stored_logs import preserve
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
@@ -66,6 +69,21 @@ def test_an_entry_says_what_the_log_contains(folder: Path) -> None:
     assert walk.configuration_sha256.startswith("5a798700")
     assert (rest.robot, rest.run, rest.walks, rest.speed_m_s) == ("mudskipper-1", "run", 0, None)
     assert rest.faults == ("drive_silent",)
+
+
+def test_the_event_of_another_mud_begins_a_mud_with_its_own_medians_and_speed(folder: Path) -> None:
+    walk, log = updated(folder)[f"{DONE}/walk.mcap"], read_log(WALK)
+    border = {"stamp_s": log.strides[2]["stamp_s"], "text": "another mud"}
+    muds = entry_of_log(walk, log._replace(events=[border])).muds
+    for mud, strides in zip(muds, (log.strides[:2], log.strides[2:]), strict=True):
+        assert (mud.strides, mud.k_p) == (len(strides), median(stride["k_p"] for stride in strides))
+        assert mud.speed_m_s == pytest.approx(0.12 / 1.57, rel=0.02)  # a step in the time between two insertions
+
+
+def test_a_copy_that_an_earlier_version_exported_counts_nothing(folder: Path) -> None:
+    LogFile(folder / ACTIVE / "ros.mcap", OPENING | {"metadata": {EXPORTED: "true"}}).finish()
+    entry = updated(folder)[f"{DONE}/ros.mcap"]
+    assert (entry.state, entry.duration_s) == ("export", None)
 
 
 def test_a_log_is_read_once_and_added_when_it_is_closed(folder: Path, readings: list[str]) -> None:
