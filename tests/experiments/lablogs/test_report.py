@@ -75,8 +75,8 @@ def test_logs_in_air_are_in_no_group_and_their_values_are_counted(summary: dict[
 
 @pytest.mark.parametrize("logs", [LOGS, []])
 def test_some_logs_and_none_make_tables_and_figures(logs: list[EvaluatedLog]) -> None:
-    for draw in (plots.draw_strokes, plots.draw_scatter, plots.draw_left_right, plots.draw_sensitivity):
-        assert len(draw(joined(*logs)).axes) % len(METHODS) == 0
+    draws = (plots.draw_strokes, plots.draw_scatter, plots.draw_left_right, plots.draw_sensitivity)
+    assert [len(draw(joined(*logs)).axes) for draw in draws] == [len(METHODS) * n for n in (2 if logs else 1, 3, 3, 3)]
     tables = tables_of(evaluated(*logs))
     assert bool(logs) == any(table.section == "Method default" for table in tables)
     assert tables[-1].cells()[1] == ["x.csv", "x.csv: ends at line 1"]

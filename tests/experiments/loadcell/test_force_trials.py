@@ -87,10 +87,10 @@ def true_slope(curve: Curve, deepest_m: float) -> float:
     return float(volumes_m3 @ forces_n[inside] / (volumes_m3 @ volumes_m3))
 
 
-@pytest.fixture(scope="module")
-def clay_trials() -> list[AnalysedTrial]:
+@pytest.fixture(scope="module", params=[feel, feel_by_hand])
+def clay_trials(request: pytest.FixtureRequest) -> list[AnalysedTrial]:
     """Return trials of one stage that start at random times between two samples."""
-    return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(6)], look)
+    return analyse([request.param(clay_plate(49.5), INSERTION, 40 + i) for i in range(6)], look)
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_e"])
@@ -102,8 +102,8 @@ def test_the_error_of_a_trial_is_about_its_standard_error_though_clay_does_not_f
     reported = [trial.coefficients[name] for trial in clay_trials]
     errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in reported])))
     says = float(np.sqrt(np.mean([each.std_error**2 for each in reported])))
-    assert errs < 0.006 * true
-    assert says / 3.0 < errs < 1.5 * says
+    assert errs < (0.01 if clay_trials[0].is_measured else 0.006) * true
+    assert says / 3.0 < errs < 1.7 * says
 
 
 def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
