@@ -80,6 +80,12 @@ def test_the_title_counts_the_trials_that_are_in_the_table() -> None:
         assert table.title.endswith(f"mean ± sd of {count}")
 
 
+def test_each_stride_is_listed_in_centimetres() -> None:
+    walk = Walk([WalkedStride("a", 0.614, 0.0305, 0.04, 2.5, 0.0)], "")
+    table = table_one({"3 cm": [walk]}, ARM_M, {}, {"mud_length_cm": {"a": 61.0}})
+    assert list(table["walks"]["3 cm"][0][0].values()) == ["a", 61.4, 3.05, 4.0, 2.5, "slippage"]
+
+
 # in simulation
 
 
