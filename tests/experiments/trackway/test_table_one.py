@@ -80,6 +80,14 @@ def test_the_title_counts_the_trials_that_are_in_the_table() -> None:
         assert table.title.endswith(f"mean ± sd of {count}")
 
 
+def test_the_table_shows_mean_and_deviation_next_to_the_papers() -> None:
+    walks = [Walk([stride(step_m, mud) for mud in MUDS for _ in range(3)], "") for step_m in (0.14, 0.16)]
+    table = table_one({"3 cm": walks}, ARM_M, {}, {"mud_length_cm": dict.fromkeys(MUDS, 61.0)})
+    _, ours, _, paper = speed_table(table).cells()
+    assert ours == ["3 cm", *["7.50 ± 0.71"] * 3, "7.50"]
+    assert paper[1:3] == ["7.6 ± 0.5, ours within", "2.1 ± 0.8, ours outside"]
+
+
 def test_each_stride_is_listed_in_centimetres() -> None:
     walk = Walk([WalkedStride("a", 0.614, 0.0305, 0.04, 2.5, 0.0)], "")
     table = table_one({"3 cm": [walk]}, ARM_M, {}, {"mud_length_cm": {"a": 61.0}})
