@@ -14,6 +14,7 @@ orders is limited as every operator's order is. A law that raises, or answers wh
 """
 
 import runpy
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from traceback import extract_tb
@@ -76,6 +77,7 @@ def load_law(target: str) -> tuple[Law, float]:
     file, colon, name = target.rpartition(":")
     path, name = Path(file if colon else target), name if colon else "law"
     path.stat()  # raises OSError where it is missing
+    sys.path.append(str(path.absolute().parent))  # a law imports what lies next to it
     try:
         found = runpy.run_path(str(path))
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's file

@@ -104,6 +104,13 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
     assert daemon.orders == list(orders)
 
 
+def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "depths_of_mine.py").write_text("DEPTH_M = 0.025\n", encoding="utf-8")
+    found, _ = run.load_law(law(tmp_path, "return __import__('depths_of_mine').DEPTH_M"))
+    assert run.order_of(found, []) == {"depth_m": 0.025}
+
+
 @pytest.mark.parametrize(
     ("body", "named"),
     [
