@@ -2,6 +2,7 @@
 
 import struct
 from _socket import AF_UNIX, SO_PEERCRED, SO_SNDTIMEO, SOCK_STREAM, SOL_SOCKET, socket  # `socket` is slow to import
+from _thread import allocate_lock
 from contextlib import suppress
 from os import PathLike, fspath
 from os.path import splitext
@@ -52,7 +53,7 @@ class StatusClient:
     def __init__(self, path: str | PathLike[str], timeout_s: float = ANSWER_S) -> None:
         self._path = fspath(path)
         stem, ending = splitext(self._path)
-        self._number = 0
+        self._number, self._one_thread = 0, allocate_lock()
         self._unpacker = msgpack.Unpacker(raw=False)
         try:
             self._socket = _connected(f"{stem}{OPERATORS}{ending}", timeout_s)
@@ -83,6 +84,16 @@ class StatusClient:
         longest = max((len(value) for value in params.values() if isinstance(value, list)), default=0)
         if len(params) > MOST_PARAMS or longest > LONGEST_ARRAY:  # for which the daemon closes the connection
             raise CallRefusedError(f"{method}: a request has {LONGEST}")
+        with self._one_thread:
+            problem, result = self._exchange(method, params)
+        if problem is not None and str(problem).startswith(NOT_PERMITTED):
+            raise NotPermittedError(str(problem).removeprefix(NOT_PERMITTED))
+        if problem is not None:
+            raise CallRefusedError(problem)
+        return result
+
+    def _exchange(self, method: str, params: dict[str, Any]) -> tuple[Any, Any]:
+        """Send a request and return problem and result of its answer."""
         self._number += 1
         message = [REQUEST, self._number, method, params]
         request = msgpack.packb(message, default=plain, unicode_errors="backslashreplace")
@@ -92,18 +103,13 @@ class StatusClient:
         try:
             with suppress(ConnectionError):  # what it said before it closed the connection can still be read
                 self._socket.sendall(request)
-            problem, result = self._receive()
+            return self._receive()
         except ConnectionError as problem_reading:
             raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading
         except OSError as problem_reading:
             raise DroppedError(f"the daemon on {self._path} does not answer: {SILENT}") from problem_reading
         except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
             raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
-        if problem is not None and str(problem).startswith(NOT_PERMITTED):
-            raise NotPermittedError(str(problem).removeprefix(NOT_PERMITTED))
-        if problem is not None:
-            raise CallRefusedError(problem)
-        return result
 
     def read_map(self) -> list[dict[str, Any]]:
         """Return the mud along the track since the walk began, page after page."""

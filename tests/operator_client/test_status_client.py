@@ -3,6 +3,7 @@
 import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,26 @@ def test_a_request_for_which_the_daemon_closes_the_connection_is_not_sent(
 def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
     """An answer stays unread if Ctrl-C interrupts its request."""
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
+
+
+def test_threads_that_share_a_client_get_their_own_answers(ends: Ends) -> None:
+    """As where one thread renews the lease while another one works."""
+    client, connection = ends
+
+    def answer_each() -> None:
+        unpacker = msgpack.Unpacker()
+        while data := connection.recv(4096):
+            unpacker.feed(data)
+            for _, number, method, _ in unpacker:
+                connection.sendall(msgpack.packb([rpc.RESPONSE, number, None, method]))
+
+    methods = ["lease", "status"] * 100
+    with ThreadPoolExecutor() as threads:
+        threads.submit(answer_each)
+        try:
+            assert list(threads.map(client.call, methods)) == methods
+        finally:
+            client.close()
 
 
 @pytest.mark.parametrize(
