@@ -18,7 +18,7 @@ log = mudskipper.open_log(sys.argv[1])
 time_s = log.ticks["stamp_s"] - log.ticks["stamp_s"][0]
 
 figure, (forces, coefficients) = plt.subplots(2, 1, sharex=True, layout="constrained")
-for number, flipper in enumerate(("left", "right")):
+for number, flipper in enumerate(log.rig.flippers):
     forces.plot(time_s, log.ticks["force_x_n"][:, number], label=f"{flipper}, forward")
     forces.plot(time_s, log.ticks["force_z_n"][:, number], label=f"{flipper}, up")
 forces.set_ylabel("force (N)")

@@ -13,11 +13,12 @@ import pandas as pd
 import pytest
 
 import mudskipper
-from control.records import Phase
+from control.records import Phase, Rig
 from firmware_host.log.log_file import LogFile
+from firmware_host.log.rows import TICK_KIND, tick_kind
 from logs.files.log_reader import read_log
 from logs.replay import replay_files
-from tests.firmware_host.synthetic_rows import OPENING
+from tests.firmware_host.synthetic_rows import OPENING, encode_row
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
@@ -119,6 +120,14 @@ def test_forces_are_plotted(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert "6 strides" in run_example("plot_forces.py", str(LOG), str(tmp_path / "forces.png"))
     assert (tmp_path / "forces.png").stat().st_size > 10_000
+
+
+def test_forces_of_a_single_flipper_are_plotted(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    log = LogFile(tmp_path / "right.mcap", OPENING | {"flippers": ["right"]})
+    log.write([(TICK_KIND, encode_row(tick_kind(Rig(("right",)))))])
+    log.finish()
+    assert "1 ticks and 0 strides" in run_example("plot_forces.py", str(log.path), str(tmp_path / "forces.png"))
 
 
 def test_methods_are_compared_stride_by_stride() -> None:
