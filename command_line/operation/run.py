@@ -26,6 +26,7 @@ from command_line.operation.attended_walk import LEASE_S, LawError, attend, atte
 from command_line.operation.operation import TakeOver
 from command_line.shared_options import Json, Socket
 from experiments.study.option import Option
+from firmware_host.lease import TAKEN_OVER
 from operator_client.status_client import CallRefusedError, StatusClient
 
 LOWEST_HZ, HIGHEST_HZ = 1.0, 50.0  # a move of a client of 200 requests a second takes three
@@ -118,10 +119,15 @@ def _answer_of(law: Law, seen: Any) -> Any:
 
 
 def _give(client: StatusClient, method: str, order: Report, mode: str) -> None:
-    """Give an order. Raises LawError where the daemon refuses it although the robot is in the mode for it."""
+    """Give an order. Raises LawError where the daemon refuses it although the robot is in the mode for it.
+
+    Raises CallRefusedError after a take-over: a stop would then be one of the program that moves the robot now.
+    """
     try:
         _send(client, method, order)
     except CallRefusedError as problem:
+        if str(problem).startswith(TAKEN_OVER):
+            raise
         if client.call("status")["mode"] == mode:
             raise LawError(f"the order {order!r:.80} is refused: {problem}") from problem
 

@@ -14,6 +14,7 @@ from command_line.errors import CommandError
 from command_line.operation import attended_walk, run
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
+from firmware_host.lease import TAKEN_OVER
 from operator_client.status_client import CallRefusedError, StatusClient, plain
 from tests.folders import ROOT
 
@@ -136,6 +137,13 @@ def test_an_order_that_the_daemon_refuses_stops_the_robot(
     daemon._refusal = "depth_m = 9: too deep"
     assert run.run(law(tmp_path, "return 9.0"), socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
     assert daemon._refusal in capsys.readouterr().err
+
+
+def test_a_program_that_takes_the_robot_over_is_not_stopped(daemon: WalkOfTwoStrides, tmp_path: Path) -> None:
+    daemon._refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
+    with pytest.raises(CallRefusedError, match="uid 7"):
+        run.run(law(tmp_path, "return 0.02"), socket=tmp_path)
+    assert not daemon._stopped
 
 
 def joint_law(folder: Path, body: str, rate_hz: str = "50.0") -> str:
