@@ -406,7 +406,7 @@ def _walk_report(loop: Loop) -> dict[str, Any]:
         "phase": loop.target.phase.name.lower(),
         "stride": loop.target.stride,
         "depth_m": loop.stride_depth_m,
-        "next_depth_m": gait.next_depth_m,
+        "next_depth_m": gait.next_depth_m or loop.configuration.adaptation.initial_depth_m,  # before the first walk
         "depth_reason": loop.learning.depth_reason,
         "full_step_m": 0.0 if gait.path else full_step_m(gait.next_parameters, loop.configuration.geometry),
         "body_x_m": known(loop.body.x_m),

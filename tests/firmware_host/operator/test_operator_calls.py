@@ -405,6 +405,7 @@ def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(a
     loop = armed.steps.loop
     with pytest.raises(RefusedError, match="hold"):
         armed.ask("depth", depth_m=0.02)
+    assert armed.ask("status")["next_depth_m"] == loop.configuration.adaptation.initial_depth_m  # `joy` goes on from it
     armed.ask("walk")
     armed.steps.run_until(lambda: loop.target.stride == 1, 20.0)
     with pytest.raises(RefusedError, match="max_depth_m"):
