@@ -71,11 +71,11 @@ def _temporary_path(path: Path) -> Path:
     return temporary
 
 
-def run_command(words: Sequence[str]) -> Outcome:
+def run_command(words: Sequence[str], timeout_s: float | None = COMMAND_TIMEOUT_S) -> Outcome:
     try:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=COMMAND_TIMEOUT_S, check=False)
+        done = subprocess.run(words, capture_output=True, text=True, timeout=timeout_s, check=False)
     except subprocess.TimeoutExpired:
-        return Outcome(124, f"took longer than {COMMAND_TIMEOUT_S:g} s")
+        return Outcome(124, f"took longer than {timeout_s:g} s")
     except FileNotFoundError:
         return Outcome(127, f"{words[0]} is not installed")
     return Outcome(done.returncode, done.stdout + done.stderr)

@@ -7,6 +7,7 @@ present configuration and list its keys. An earlier package is the way back.
 import os
 import sys
 from collections.abc import Collection, Iterator
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -30,6 +31,7 @@ from control.modes import ENERGISED
 from experiments.study.option import Option
 from operator_client.status_client import NoDaemonError, StatusClient
 
+PATIENT: Run = partial(run_command, timeout_s=None)  # a dpkg that is ended leaves half a package
 PRINT_KEYS = """\
 from command_line.init.key_reference import configuration_keys
 print(*(f"{key.section}.{key.name}" for key in configuration_keys()), sep="\\n")
@@ -41,7 +43,7 @@ def upgrade(
     *,
     check: Annotated[bool, Option("only say what would change")] = False,
     socket: Socket,
-    run: Run = run_command,
+    run: Run = PATIENT,
     root: Path = Path("/"),
 ) -> int:
     """Install the package, unless a drive has torque or the other version does not accept the configuration."""

@@ -12,6 +12,7 @@ import pytest
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
+from command_line.install import installation
 from command_line.install import upgrade as upgrade_module
 from command_line.install.service_plan import (
     CONFIGURATION,
@@ -86,6 +87,18 @@ def test_a_check_names_keys_and_files_and_changes_nothing(
 
 def test_an_upgrade_installs_the_package(computer: Computer) -> None:
     assert computer.upgrade() == exit_codes.OK and computer.installed
+
+
+def test_a_slow_dpkg_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("dpkg", "dpkg-deb", "dpkg-query"):
+        (tmp_path / name).write_text('#!/bin/sh\nsleep 0.2\necho >"$0.done"\n', encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(installation, "COMMAND_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(upgrade_module, "_describe", lambda *arguments: [])
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert upgrade(Path("new.deb"), socket="/none") == exit_codes.OK
+    assert (tmp_path / "dpkg.done").exists()
 
 
 @pytest.mark.parametrize("mode", sorted(mode.name.lower() for mode in ENERGISED))
