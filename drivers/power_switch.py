@@ -59,7 +59,7 @@ class PowerSwitch:
         try:
             cut, reason = self._read(), f"{self._name} says so"
         except OSError:
-            cut, reason = True, f"{self._name} cannot be read any more"
+            cut, reason = True, f"{self._name} cannot be read any more; once it is back, restart the daemon"
         if cut:
             self._cut_s = now_s
             self.reason = reason if self._was_cut else self.reason

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -54,6 +55,11 @@ RELEASED = [0] * (int(RELEASED_S / STEP_S) + 1)
 )
 def test_a_contact_bounces_and_an_input_that_vanishes_counts_as_cut(readings: list[Any], cut: list[bool]) -> None:
     assert states(readings) == cut
+
+
+def test_an_input_that_vanished_names_the_way_back() -> None:
+    switch = PowerSwitch(lambda: bool(Path("/none").stat()), "line 3")
+    assert "restart the daemon" in [switch.update(1.0), switch.update(2.0)][1]
 
 
 def gpio(value: Any, opened: list[Any]) -> dict[str, Any]:
