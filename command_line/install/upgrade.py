@@ -59,6 +59,8 @@ def upgrade(
     if problems:
         raise CommandError(*problems, status=exit_codes.CONFIGURATION)
     if not check:
+        if installed.status != 0:
+            raise CommandError("what is installed is no package: docs/how-to/install.md says how one replaces it")
         if os.geteuid() != 0:
             raise CommandError("this changes the system: run it with sudo", status=exit_codes.NOT_PERMITTED)
         print(_output(run, "dpkg", "--install", str(package)))

@@ -35,7 +35,7 @@ class Computer:
     def __init__(self, root: Path) -> None:
         self.root, self.commands = root, [""]
         self.keys = [f"{key.section}.{key.name}" for key in configuration_keys()]
-        self.refusal = ""
+        self.refusal, self.is_package = "", True
         for path, text in load_sources(PREFIX).items():
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(text, encoding="utf-8")
@@ -49,6 +49,8 @@ class Computer:
                 (share / source.name).write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
             live = share / Path(LIVE_UNIT).name
             live.write_text(live.read_text(encoding="utf-8") + "# new\n", encoding="utf-8")
+        if words[0] == "dpkg-query" and not self.is_package:
+            return Outcome(1, "dpkg-query: no packages found matching mudskipper")
         if "--check-config" in words:
             return Outcome(exit_codes.CONFIGURATION if self.refusal else 0, self.refusal)
         return Outcome(0, "\n".join(self.keys) if "-c" in words else "1.0")
@@ -87,6 +89,15 @@ def test_a_check_names_keys_and_files_and_changes_nothing(
 
 def test_an_upgrade_installs_the_package(computer: Computer) -> None:
     assert computer.upgrade() == exit_codes.OK and computer.installed
+
+
+def test_no_upgrade_of_an_installation_that_is_no_package(computer: Computer) -> None:
+    """dpkg would mix the package's files with those that pip installed, below a daemon that runs."""
+    computer.is_package = False
+    assert computer.upgrade(check=True) == exit_codes.OK
+    with pytest.raises(CommandError, match="no package"):
+        computer.upgrade()
+    assert not computer.installed
 
 
 def test_a_slow_dpkg_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
