@@ -75,7 +75,7 @@ def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random, drive: st
 
 def _demanded(mode: FailureMode) -> tuple[str, int | None]:
     """Return the reaction that the failure demands, and the ticks within which it must come."""
-    if mode.fault_kind and not mode.waived:
+    if mode.fault_kind and mode.demands_reaction:
         return mode.fault_kind.reaction.name.lower(), mode.bound_ticks or mode.fault_kind.bound_ticks
     if mode.ends_loop:
         return "drives_idle", BUG_BOUND_TICKS if mode.raises else WATCHDOG_TICKS

@@ -31,6 +31,7 @@ TICKS = ("bound_ticks", "reaction_ticks", "reported_ticks", "zero_torque_ticks")
 COLUMNS = 2  # panels side by side: there are many faults
 HIGHEST_PERCENT = 100.0
 DARK_PERCENT = 55.0  # from here on letters are white
+FULL_SIZE = 3  # letters that fit into a cell
 Cells = Sequence[dict[str, Any]]
 
 
@@ -142,7 +143,8 @@ def _table(by_mode: Cells) -> Table:
 def draw(cells: Cells, by_mode: Cells) -> Drawing:
     """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell.
 
-    Where no reaction is demanded the energy of a motor takes the place of the ticks. The label of a row has the bound.
+    Where no reaction is demanded the energy of a motor takes the place of the ticks. The label of a row has the bound,
+    or the smallest and the largest one where the energy depends on the phase.
     """
     phases = [phase for phase in PHASES if any(cell["phase"] == phase for cell in cells)]
     columns = min(COLUMNS, len(by_mode))
@@ -161,10 +163,10 @@ def draw(cells: Cells, by_mode: Cells) -> Drawing:
 
 def _draw_panel(panel: Axes, cells: Cells, rows: Cells, phases: Sequence[str]) -> Any:
     percent = np.full((len(rows), len(phases)), np.nan)
-    for y, row in enumerate(rows):
+    by_name = {row["mode_name"]: [cell for cell in cells if cell["mode_name"] == row["mode_name"]] for row in rows}
+    for y, of_mode in enumerate(by_name.values()):
         for x, phase in enumerate(phases):
-            own = [cell for cell in cells if (cell["mode_name"], cell["phase"]) == (row["mode_name"], phase)]
-            if own:
+            if own := [cell for cell in of_mode if cell["phase"] == phase]:
                 percent[y, x] = _write_cell(panel, x, y, own)
     mesh = panel.pcolormesh(
         np.ma.masked_invalid(percent), cmap="YlGnBu", vmin=0.0, vmax=HIGHEST_PERCENT, edgecolors="white", linewidth=1.0
@@ -173,15 +175,17 @@ def _draw_panel(panel: Axes, cells: Cells, rows: Cells, phases: Sequence[str]) -
     panel.invert_yaxis()
     panel.set_xticks(np.arange(len(phases)) + 0.5, list(phases), rotation=60, ha="left", fontsize="small")
     panel.xaxis.tick_top()
-    panel.set_yticks(np.arange(len(rows)) + 0.5, [_label(row) for row in rows], fontsize="x-small")
+    panel.set_yticks(np.arange(len(rows)) + 0.5, [_label(*each) for each in by_name.items()], fontsize="x-small")
     panel.grid(visible=False)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
     return mesh
 
 
-def _label(row: dict[str, Any]) -> str:
-    return f"{row['mode_name']}  ≤ {row['bound_ticks'] or '{:.1f} J'.format(row['energy_bound_j'])}"
+def _label(mode_name: str, cells: Cells) -> str:
+    bounds_j = sorted(cell["energy_bound_j"] for cell in cells)
+    energies = " to ".join(dict.fromkeys(f"{bound_j:.1f}" for bound_j in (bounds_j[0], bounds_j[-1])))
+    return f"{mode_name}  ≤ {cells[0]['bound_ticks'] or f'{energies} J'}"
 
 
 def _write_cell(panel: Axes, x: int, y: int, cells: Cells) -> float:
@@ -194,7 +198,8 @@ def _write_cell(panel: Axes, x: int, y: int, cells: Cells) -> float:
         largest = max(cells, key=lambda cell: cell["energy_j"] - cell["energy_bound_j"])
         text, percent = f"{largest['energy_j']:.1f}", 100.0 * largest["energy_j"] / max(largest["energy_bound_j"], 1e-9)
     colour = "white" if percent > DARK_PERCENT else INK
-    panel.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=6.5, color=colour)
+    size = 6.5 if len(text) <= FULL_SIZE else 5.0
+    panel.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=size, color=colour)
     if not all(cell["ok"] for cell in cells):
         panel.plot(x + 0.5, y + 0.5, "x", color=TRAIL, markersize=11, markeredgewidth=2.0)
     return percent
