@@ -42,6 +42,7 @@ MARKS: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "|", "markersi
 SHORTEST_S = 0.1  # least length of the time axis
 ROOM_FOR_LETTER = 0.018  # of the width of a panel
 HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut
+HIGHEST = 0.96  # of the top of a panel: a mark that is higher is drawn here
 Draw = Callable[[Axes, RecordedWalk], None]
 LEGEND: dict[str, Any] = {
     "loc": "lower right",
@@ -140,23 +141,36 @@ def _draw_forces(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _draw_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
-    """Draw values as dots, lower bounds as triangles, invalid ones hollow; bars are two standard errors."""
-    colour = FLIPPER_COLOURS[walk.flipper]
+    """Draw values as dots, lower bounds as triangles, invalid ones hollow; bars are two standard errors.
+
+    An invalid value may be of any size: above the scale of the valid ones it stands at the upper edge, without a bar.
+    """
+    colour, top = FLIPPER_COLOURS[walk.flipper], _top_of(walk, name)
     known = [stride for stride in walk.own_strides if np.isfinite(stride[name])]
     for at_least, valid in product((False, True), repeat=2):
         marked = [s for s in known if (bool(s[f"{name}_at_least"]), bool(s[f"{name}_valid"])) == (at_least, valid)]
         stamps_s, values, errors = _columns(marked, "stamp_s", name, f"{name}_std_error")
         look: dict[str, Any] = {"color": colour, "elinewidth": 1.2, "markerfacecolor": colour if valid else "white"}
         look["label"] = ("lower bound" * at_least or "not valid" * (not valid)) * bool(marked)
-        bars = np.where(np.isfinite(errors), 2.0 * errors / 1e6, np.nan)
-        panel.errorbar(stamps_s, values / 1e6, bars, fmt="^" if at_least else "o", markersize=5, **look)
-    largest = max((stride[name] / 1e6 for stride in walk.strides if np.isfinite(stride[name])), default=0.0)
-    panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
+        bars = np.where(np.isfinite(errors) & (values <= 1e6 * top), 2.0 * errors / 1e6, np.nan)
+        shown = np.minimum(values / 1e6, HIGHEST * top)
+        panel.errorbar(stamps_s, shown, bars, fmt="^" if at_least else "o", markersize=5, **look)
+    panel.set_ylim(0.0, top)
+    if not known:
+        panel.text(0.5, 0.5, "no estimate", transform=panel.transAxes, ha="center", va="center", color=FAINT)
     if walk.noticed_s:
         look = MARKS if len(walk.noticed_s) > MOST_DASHES else DASHES
         panel.plot([], [], **look, label="another mud noticed")
     if panel.get_legend_handles_labels()[0]:
         panel.legend(ncols=3, **LEGEND)
+
+
+def _top_of(walk: RecordedWalk, name: str) -> float:
+    """Return the top of a coefficient's panels in N/cm³, by the valid values of both flippers if there are any."""
+    known = [stride for stride in walk.strides if np.isfinite(stride[name])]
+    scaling = [stride for stride in known if stride[f"{name}_valid"]] or known
+    largest = max((stride[name] / 1e6 for stride in scaling), default=0.0)
+    return HEADROOM * largest if largest > 0.0 else 1.0
 
 
 def _columns(strides: list[Stride], *names: str) -> list[Floats]:

@@ -65,7 +65,7 @@ ORIGINS = {
 }
 WALK = (
     "Forces, coefficients and depth of each flipper, position and steps of the body. Bars are two standard errors, "
-    "triangles lower bounds, hollow marks invalid values."
+    "triangles lower bounds, hollow marks invalid values, of which those above the scale stand at its upper edge."
 )
 FITS = (
     "Every fit and its residuals: the torque that resists the flipper against the moment of the submerged plate. The "

@@ -130,6 +130,17 @@ def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: 
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
 
 
+def test_an_invalid_value_does_not_hide_the_valid_ones(two_walks: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    first, *others = walk.strides
+    wild = first | {"k_p": 1e9, "k_p_valid": False}
+    usual, hollow = draw_walk(walk), draw_walk(walk._replace(strides=[wild, *others]))
+    assert panel(hollow, "$k_p$").get_ylim()[1] <= panel(usual, "$k_p$").get_ylim()[1]
+    heights = [np.asarray(mark[0].get_ydata()) for axes in row_of(hollow, "$k_p$") for mark in axes.containers]
+    drawn = np.concatenate(heights)
+    assert len(drawn) == len(walk.strides) and max(drawn) < panel(hollow, "$k_p$").get_ylim()[1]
+
+
 def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     """A mark shows where a flipper was stuck when its stride closed; slipping and stuck strides have coloured bars."""
     walk = read_walk(two_walks, 1)
