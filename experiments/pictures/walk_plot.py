@@ -197,8 +197,10 @@ def _draw_position(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _draw_steps(panel: Axes, walk: RecordedWalk) -> None:
-    """Draw a bar from the start of each stride to its end, in the colour of its outcome."""
-    known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
+    """Draw a bar from the start of each stride to its end, in the colour of its outcome: stuck, if any flipper was."""
+    stuck = {stride["index"] for stride in walk.strides if not stride["released"]}
+    own = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
+    known = [stride | {"released": stride["index"] not in stuck} for stride in own]
     for outcome in Outcome:
         own = [stride for stride in known if outcome_of(walk, stride) is outcome]
         starts_s, ends_s, steps_m = _columns(own, "t_start_s", "stamp_s", "step_m")

@@ -142,10 +142,15 @@ def test_an_invalid_value_does_not_hide_the_valid_ones(two_walks: Path) -> None:
 
 
 def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
-    """A mark shows where a flipper was stuck when its stride closed; slipping and stuck strides have coloured bars."""
+    """A mark shows where a flipper was stuck when its stride closed; slipping and stuck strides have coloured bars.
+
+    The body's stride is stuck if either flipper was.
+    """
     walk = read_walk(two_walks, 1)
     slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
     slipping["released"] = True
+    left_stuck = draw_walk(walk._replace(strides=[slipping, stuck | {"released": True}, stuck | {"flipper": 0}]))
+    assert Outcome.STUCK in panel(left_stuck, "step").get_legend_handles_labels()[1]
     figure = draw_walk(walk._replace(strides=[slipping, stuck]))
     (mark,) = [line for line in row_of(figure, "depth")[1].lines if line.get_label() == "stuck"]
     row = int(np.searchsorted(walk.time_s, stuck["stamp_s"]))
