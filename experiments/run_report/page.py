@@ -388,7 +388,7 @@ def _difference_rows(found: Sequence[Entry], labels: Mapping[str, str]) -> list[
                 "in the first run": value_text(each["first"], per=per),
                 "in this run": value_text(each["other"], per=per),
                 "difference": value_text(each["difference"], each["std_error"], per=per),
-                "of the first": f"{100.0 * each['difference'] / each['first']:+.0f} %" if each["first"] else "-",
+                "of the first": f"{100.0 * each['difference'] / abs(each['first']):+.0f} %" if each["first"] else "-",
                 "verdict": verdicts[is_shown(each)] + depth,
             }
         )

@@ -175,6 +175,12 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
 
 
+def test_a_run_that_is_faster_than_one_backward_differs_by_a_positive_percentage() -> None:
+    runs = [run_of([stride("A", step_m=step_m, duration_s=1.0)], name=str(step_m)) for step_m in (-0.1, 0.1)]
+    table = comparison_result(runs, [headline_of(run) for run in runs]).tables[1].rows
+    assert table.loc[table["quantity"].str.startswith("speed"), "of the first"].tolist() == ["+200 %"]
+
+
 def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_repeat() -> None:
     trials = [
         {"mud": "A", "trial": "3", "tags": "wet,warm", "operator": "Anna"},
