@@ -86,6 +86,8 @@ def _draw_samples(
         fit.plot(*np.hstack(lines), color=looks[str(mud)]["color"], linewidth=0.8)
         residuals.plot(np.concatenate(places), remains, **looks[str(mud)])
         drawn.append((torques, remains))
+    if len(drawn) == 1:
+        fit.text(0.5, 0.5, "no fit", transform=fit.transAxes, ha="center", va="center", color=FAINT)
     residuals.axhline(0.0, color=FAINT, linewidth=0.8)
     torques, remains = map(np.concatenate, zip(*drawn, strict=True))
     return torques, remains

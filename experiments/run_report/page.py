@@ -78,7 +78,10 @@ R_SQUARED = (
     "root mean squares. A lower bound has no fit. The table has the median over strides."
 )
 DEPTHS = "Coefficients from other depths differ also in the same mud."
-COMPARED = "Speed and coefficients of each run by mud. Bars are two standard errors; an arrow marks a lower bound."
+COMPARED = (
+    "Speed and coefficients of each run by mud. Bars are two standard errors, grey dashes the strides; an arrow marks "
+    "a lower bound."
+)
 
 
 def report_of(runs: Sequence[Run]) -> Result:

@@ -41,6 +41,8 @@ def test_the_table_has_medians_over_strides_and_nothing_without_a_fit(run: Run) 
     assert rows["k_p"]["left: fits"] == 3
     assert rows["k_p"]["left: R²"] == median(samples.r_squared for samples in samples_of(run, "left", "k_p"))
     assert rows["k_s"]["right: fits"] == "-" and np.isnan(rows["k_s"]["right: R²"])  # a bound in every stride
+    of_k_p, *_, of_k_s, _ = draw_fits(run).axes[2:8]
+    assert of_k_s.texts and not of_k_p.texts  # an empty panel says so
 
 
 def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: Run) -> None:
