@@ -10,28 +10,33 @@ from experiments.pictures.side_view import SideView, view_from_side
 from experiments.reports.style import FAINT, TRAIL
 
 POINTS = 40  # of each row
+LOWEST_M, HIGHEST_M, MARGIN_M = -0.02, 0.12, 0.02  # what is always shown, and the room below and above the path
 COLOURS = {"insertion": "#0072b2", "stance": "#009e73", "extraction": "#d55e00", "swing": FAINT, "pause": TRAIL}
 
 
 def draw_gait(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> Any:
-    """Return a figure of one stride, with the body where the stride begins."""
+    """Return a figure of one stride, with the body where the stride begins. A pause is a dot."""
     from matplotlib.figure import Figure
 
+    rows = stride_table(path, geometry, depth_m)
+    edges = [[_view(geometry, *row.at(i / POINTS)[:2]).edge for i in range(POINTS + 1)] for row in rows]
+    heights_m = [LOWEST_M, HIGHEST_M, *(z_m for row in edges for _, z_m in row)]
     figure = Figure(figsize=(7.0, 4.0))
     panel = figure.subplots()
-    half_m, deepest_m = 1.2 * geometry.flipper_length_m, depth_m + 0.02
-    prepare(panel, -half_m, half_m, deepest_m, 0.14)
-    seen = set[str]()
-    for row in stride_table(path, geometry, depth_m):
-        views = [_view(geometry, *row.at(i / POINTS)[:2]) for i in range(POINTS + 1)]
+    half_m = 1.2 * geometry.flipper_length_m
+    prepare(panel, -half_m, half_m, MARGIN_M - min(heights_m), MARGIN_M + max(heights_m))
+    for row, points in zip(rows, edges, strict=True):
         name = path.phase[row.number].name
-        edges = [view.edge for view in views]
-        label = name if name not in seen else None
-        panel.plot(*zip(*edges, strict=True), color=COLOURS[name], linewidth=2.0, label=label, zorder=5)
-        seen.add(name)
-    draw_view(panel, _view(geometry, row.sweep_end_rad, row.depth_end_m), "left")
+        label = name if name not in panel.get_legend_handles_labels()[1] else None
+        look: dict[str, Any] = {"marker": "o" * (name == "pause"), "color": COLOURS[name], "linewidth": 2.0}
+        panel.plot(*zip(*points, strict=True), label=label, zorder=5, **look)
+    draw_view(panel, _view(geometry, rows[-1].sweep_end_rad, rows[-1].depth_end_m), "left")
     panel.legend(loc="upper left", frameon=False)
     panel.set_title(f"{path.name}: lower edge of the plate, stride depth {100.0 * depth_m:g} cm")
+    panel.axis("on")
+    panel.set(xlabel="forward of the axles (cm)", ylabel="above the mud (cm)")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter(lambda at_m, _: f"{100.0 * at_m:zg}")
     return figure
 
 

@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from control.geometry import FlipperGeometry
+from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
+from experiments.pictures.gait_picture import draw_gait
 from tests.command_line.command_lines import run
 
 SWING = '[[phase]]\nname = "swing"\nduration_s = 0.8\nway_points = [{ sweep_deg = 20.0, depth_m = -0.01 }]\n'
@@ -16,6 +19,18 @@ def test_a_gait_that_is_checked_is_drawn(tmp_path: Path) -> None:
     checked = run("gait", "check", "ellipse", "--out", str(picture))
     assert checked.returncode == exit_codes.OK and "-0.72 to 3.00 to -0.72" in checked.stdout  # cm, under the body
     assert picture.stat().st_size > 10_000
+
+
+def test_the_whole_path_of_a_gait_is_drawn_on_scales_and_a_pause_is_a_dot() -> None:
+    deep, high = (WayPoint(sweep_deg=10.0, depth_m=depth_m) for depth_m in (0.05, -0.15))
+    stance, swing = GaitPhase("stance", (deep,), duration_s=1.0), GaitPhase("swing", (high,), duration_s=1.0)
+    path = GaitPath((stance, GaitPhase("pause", duration_s=0.5), swing))
+    (panel,) = draw_gait(path, FlipperGeometry(), 0.02).axes
+    low_m, high_m = panel.get_ylim()
+    assert low_m < -0.05 and high_m > 0.15
+    assert panel.get_xlabel() and panel.axison
+    markers = {str(line.get_label()): line.get_marker() for line in panel.lines}
+    assert (markers["stance"], markers["pause"]) == ("", "o")
 
 
 @pytest.mark.parametrize(
