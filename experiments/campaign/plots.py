@@ -33,7 +33,8 @@ def draw_speeds(points: Sequence[Mapping[str, Any]]) -> Figure:
         panel.set_axis_off()
     for panel in panels[::columns]:
         panel.set_ylabel("speed (cm/s)")
-    panels[0].set_ylim(bottom=0.0)
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(min(low, 0.0), max(high, 0.0))  # a robot may slide backward
     return figure
 
 

@@ -33,3 +33,9 @@ def test_each_key_has_a_panel_with_the_mean_speed_of_each_value() -> None:
 def test_a_random_sample_has_no_means_and_may_not_have_started(speeds_m_s: list[float]) -> None:
     (panel,) = draw_speeds([point(speed, strength=500.0 + i) for i, speed in enumerate(speeds_m_s)]).axes
     assert all(line.get_linestyle() == "None" for line in panel.lines)
+
+
+def test_speeds_backward_are_shown_too() -> None:
+    (panel,) = draw_speeds([point(speed, strength=500.0 + i) for i, speed in enumerate((-0.01, -0.02, 0.01))]).axes
+    low, high = panel.get_ylim()
+    assert low < -2.0 and high > 1.0
