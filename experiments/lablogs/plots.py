@@ -58,8 +58,9 @@ def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
 
 def draw_scatter(estimates: DataFrame) -> Figure:
     """Draw histograms of the deviations in claimed errors, over the groups on a fixed base."""
-    figure = _draw_panels(estimates, LABELS, _strokes_by_group, _draw_deviations, ("deviation / claimed error", ""))
-    figure.axes[0].legend(**SMALL)
+    axis_names = "deviation / claimed error", "number of strokes"
+    figure = _draw_panels(estimates, LABELS, _strokes_by_group, _draw_deviations, axis_names)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, **SMALL)
     return figure
 
 
@@ -95,6 +96,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
     drawn = pairs[is_drawn & (pairs["coefficient"] == coefficient)]
     if drawn.empty:
         panel.set(xticks=[], yticks=[])
+        panel.text(0.5, 0.5, "no pair of values", transform=panel.transAxes, ha="center", color=FAINT)
         return
     left, right, left_error, right_error = (
         drawn[name] / N_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")

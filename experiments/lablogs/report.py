@@ -29,6 +29,7 @@ from experiments.lablogs.estimates import (
 )
 from experiments.lablogs.log_choice import group_key
 from experiments.lablogs.repeatability import first_values, repeatability, separation, walk_scatter
+from experiments.reports.value_text import N_CM3
 from experiments.study.result import Table
 
 DEFINITIONS = (
@@ -49,6 +50,7 @@ HEADS = {
     "exponent_std_error": "its error",
     "first_cv": "first CV",
     "later_cv": "later CV",
+    "first_mean": "first mean",
     "chi_between_trials": "chi between trials",
     "chi_between_strokes": "chi between strokes",
     "re_entered": "in a hole",
@@ -168,8 +170,12 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
         f"Disturbed over recorded values (currents {1000.0 * DELAY_S:g} ms late or early), and the fraction that moved "
         f"by more than {MOVED:g} claimed errors with {100.0 * MISSING_ROWS:g} % of the rows missing"
     )
+    repeated = [
+        row | {"first_mean": row["first_mean"] and row["first_mean"] / N_CM3}
+        for row in _rows_by_group(summary["groups"])
+    ]
     tables = {
-        "Repeatability": DataFrame(_rows_by_group(summary["groups"])).drop(columns=["n_later"], errors="ignore"),
+        "Repeatability": DataFrame(repeated).drop(columns=["n_later"], errors="ignore"),
         "Walks": walks.drop(columns="finding"),
         "Depth law": walks.loc[walks["finding"] != "", ["group", "finding"]],
         "Separation of first strokes, in pooled standard deviations": DataFrame(summary["separation"]),
@@ -180,7 +186,7 @@ def _method_tables(method: str, summary: Summary) -> list[Table]:
     }
     section = f"Method {method}"
     return [
-        Table(f"{method} {title}", f"{section}: {title}", {"first_mean": "N/m³"}, rows.rename(columns=HEADS), section)
+        Table(f"{method} {title}", f"{section}: {title}", {"first mean": "N/cm³"}, rows.rename(columns=HEADS), section)
         for title, rows in tables.items()
         if len(rows)
     ]

@@ -79,4 +79,6 @@ def test_some_logs_and_none_make_tables_and_figures(logs: list[EvaluatedLog]) ->
     assert [len(draw(joined(*logs)).axes) for draw in draws] == [len(METHODS) * n for n in (2 if logs else 1, 3, 3, 3)]
     tables = tables_of(evaluated(*logs))
     assert bool(logs) == any(table.section == "Method default" for table in tables)
+    if logs:  # the soft group's k_s, in the unit of the pictures
+        assert dict(zip(tables[0].cells()[0], tables[0].cells()[5], strict=True))["first mean (N/cm³)"] == "1"
     assert tables[-1].cells()[1] == ["x.csv", "x.csv: ends at line 1"]
