@@ -92,7 +92,7 @@ def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
     depth.sharex(vertical)
     for panel in (vertical, shear):
         if panel.get_legend_handles_labels()[0]:
-            panel.legend(loc="upper right" if panel is vertical else "lower center", ncols=2, frameon=False)
+            panel.legend(loc="upper right" if panel is vertical else "center", ncols=2, frameon=False)
 
 
 def draw_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> Figure:
