@@ -46,7 +46,8 @@ def study(
         for name in LAWS
     )
     laws = Table("laws", "Exponent of depth by mud and walk", {"strength_pa": "Pa"}, table)
-    return Result([laws], [Figure("laws", "Exponents by mud; bands: what mud has.", lambda: draw(table))])
+    caption = "Exponents by mud, with one standard error; bands: what mud has."
+    return Result([laws], [Figure("laws", caption, lambda: draw(table))])
 
 
 def walk(strength_pa: float, seed: int, depths_m: list[float], strides: int) -> dict[str, Any]:

@@ -68,7 +68,12 @@ FIELD_OF_LAYER = {
 LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
 DODGE = 0.15  # between the methods of one mud
 COLOURS = {DEFAULT: "C0", PAPER: "C1", COMPENSATED: "C3"}
-HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
+LINEAR_PERCENT, HIGHEST_PERCENT = 20.0, 150.0  # where the logarithmic scale begins, and its end
+ERRORS = (
+    "Error of each estimate by setup, coefficient, mud and method. A dot is the median, its line ends at the 95th "
+    f"percentile. The scale is logarithmic above {LINEAR_PERCENT:g} % and ends at {HIGHEST_PERCENT:g} %, where higher "
+    "values are drawn. The dotted line is at 10 %. 'bounds': all estimates are lower bounds, which have no error."
+)
 Row = dict[str, Any]
 
 
@@ -132,7 +137,7 @@ def study(
             _table("plates", "The paper's upright plate (section II-E)", plates),
             *[_table("boundaries", "Mud boundaries", boundaries)] * bool(boundaries),
         ],
-        figures=[Figure("estimation", "", partial(draw_errors, errors))],
+        figures=[Figure("estimation", ERRORS, partial(draw_errors, errors))],
         summary=summary,
         notes=[] if boundaries else ["Mud boundaries: no walk over any"],
     )
@@ -259,6 +264,6 @@ def _draw_panel(panel: Axes, rows: DataFrame) -> None:
         )
     panel.axhline(10.0, color=FAINT, linewidth=0.8, linestyle=":")
     panel.set_xticks(range(len(muds)), list(map(mud_text, muds)))
-    panel.set_yscale("symlog", linthresh=20.0)
+    panel.set_yscale("symlog", linthresh=LINEAR_PERCENT)
     panel.set_yticks([0, 5, 10, 20, 50, 100], ["0", "5", "10", "20", "50", "100"])
     panel.set(xlabel="mud", xlim=(-0.5, max(len(muds), 1) - 0.5), ylim=(0.0, HIGHEST_PERCENT))

@@ -54,6 +54,8 @@ GROUNDS: Mapping[str, Ground] = {
     "sand-spatial": Sand("sand", 1.55e6, spatial=True),
 }
 
+SPEEDS = "Lines: speed at constant depths. Large dots: speed of the robot's own choice, at the median of its depths."
+
 
 def study(
     trials: Trials,
@@ -89,7 +91,7 @@ def study(
             Table("errors", "Estimates against a load cell; coverage: of the 95 % intervals", {}, errors),
             Table("pooled", "The same over all grounds and both setups", {}, pooled),
         ],
-        [Figure("grounds", "Speed by depth.", lambda: draw(swept))],
+        [Figure("grounds", SPEEDS, lambda: draw(swept))],
         {"speeds": swept, "errors": errors.to_dict("records"), "pooled": pooled.to_dict("records")},
     )
 

@@ -47,6 +47,10 @@ METHOD_STRIDES = 12
 METHOD_COLOURS = ("white", "C1", "C5", "C4")  # seen on the map
 FAILED_PT = (7, -14, 16, -23)  # from a dot to its number of failed strides, which no other method writes over
 OFFSET = 1.03  # between the methods' dots, as a factor of strength, so that none hides another
+MAP = (
+    "Above: the colour is the speed at a constant depth. A dot is the median of the depths that a method chose after "
+    "its second stride, its bar their range. Below: its speed as a percentage of the best constant depth's."
+)
 Summary = dict[str, Any]
 
 
@@ -81,7 +85,7 @@ def study(
     table = Table(
         "sweep", title, {}, DataFrame([{"strength": f"{mud['strength_pa']:g} Pa"} | sweep_row(mud) for mud in muds])
     )
-    return Result([table], [Figure("sweep", "", partial(draw, muds))], {"strengths": muds, "settings": settings})
+    return Result([table], [Figure("sweep", MAP, partial(draw, muds))], {"strengths": muds, "settings": settings})
 
 
 def sweep_of(walks: DataFrame) -> Summary:
@@ -136,7 +140,7 @@ def _cell(settled: Summary) -> str:
     fraction = settled["fraction_of_best"]
     percent = "-" if fraction is None else f"{100.0 * fraction:3.0f} %"
     return (
-        f"{number(settled['depth_cm'], 2)} cm  {settled['mean']:5.2f}  {percent}  {failed}/{settled['strides']}{fault}"
+        f"{number(settled['depth_cm'], 2)} cm  {settled['mean']:z5.2f}  {percent}  {failed}/{settled['strides']}{fault}"
     )
 
 
