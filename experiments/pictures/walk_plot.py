@@ -62,9 +62,8 @@ def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -
 def draw_walk(walk: RecordedWalk, layout: MudLayout | None = None) -> Figure:
     """Draw a walk, each flipper in a column. `layout` names the muds where it is known."""
     sides, regions = walk.sides, mud_regions(walk, layout)
-    of_body: dict[str, Draw] = (
-        {"body (m)": _draw_position, "step (cm)": _draw_steps} if np.any(np.isfinite(walk.body_x_m)) else {}
-    )
+    moves = np.any(np.isfinite(walk.body_x_m)) and not walk.fixed_base
+    of_body: dict[str, Draw] = {"body (m)": _draw_position, "step (cm)": _draw_steps} if moves else {}
     of_flipper: dict[str, Draw] = {
         "force (N)": _draw_forces,
         **{f"${name}$ (N/cm³)": partial(_draw_coefficient, name=name) for name in COEFFICIENTS},

@@ -163,11 +163,11 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
         assert bars[outcome].get_paths()[0].get_extents().x0 == pytest.approx(stride["t_start_s"])
 
 
-def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
+def test_without_a_pose_or_on_a_fixed_base_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
-    figure = draw_walk(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)))
-    labels = [axes.get_ylabel().split()[0] for axes in figure.axes if axes.get_ylabel()]
-    assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
+    for each in (walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), walk._replace(fixed_base=True)):
+        labels = [axes.get_ylabel().split()[0] for axes in draw_walk(each).axes if axes.get_ylabel()]
+        assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
 
 
 @pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
