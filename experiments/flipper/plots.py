@@ -27,6 +27,7 @@ from experiments.trials.stride_profile import profile_from, stroke_of
 
 Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
+LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.96), "fontsize": "small", "frameon": False}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
 
@@ -69,8 +70,9 @@ def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
                 panel.axvspan(times_s.min(), times_s.max(), color=PHASE_SHADES[phase], linewidth=0.0, zorder=0)
             panels[0].annotate(name, (times_s.mean(), 1.02), xycoords=("data", "axes fraction"), ha="center",
                                va="bottom", fontsize="small")  # fmt: skip
-    for panel in panels:
-        panel.legend(ncols=3, fontsize="small")
+    panels[0].legend(loc="center", fontsize="small", frameon=False)  # between the strokes; their names are above
+    for panel in panels[1:]:
+        panel.legend(ncols=3, **LEGEND)
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     return figure
