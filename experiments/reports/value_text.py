@@ -11,14 +11,14 @@ OF_ERROR, OF_VALUE, MOST = 2, 4, 6  # significant digits
 FINEST = 3  # decimals of a percentage
 
 
-def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> str:
-    """Format in units of `per`; a dash for no value. Unknown errors are left out."""
+def value_text(value: float | None, *errors: float | None, per: float = 1.0, digits: int = OF_VALUE) -> str:
+    """Format in units of `per`; a dash for no value. Unknown errors are left out; `digits` are those without any."""
     if value is None or not isfinite(value):
         return "-"
     value, most = value / per, _decimals(value / per, MOST)
     uncertainties = [error / per for error in errors if error is not None and isfinite(error)]
     decimals = [min(most, _decimals(uncertainty, OF_ERROR)) for uncertainty in uncertainties if uncertainty]
-    ends = max(decimals, default=_decimals(value, OF_VALUE))
+    ends = max(decimals, default=_decimals(value, digits))
     errors_text = [
         f"{uncertainty:.{min(most, _decimals(uncertainty, OF_ERROR)) if uncertainty else ends}f}"
         for uncertainty in uncertainties
@@ -27,8 +27,8 @@ def value_text(value: float | None, *errors: float | None, per: float = 1.0) -> 
 
 
 def coefficient_text(value: float | None, *errors: float | None, at_least: bool = False) -> str:
-    """Format in N/cm³; ≥ marks a lower bound."""
-    return f"{'≥ ' * at_least}{value_text(value, *errors, per=N_CM3)}"
+    """Format in N/cm³; ≥ marks a lower bound, which is known to two digits."""
+    return f"{'≥ ' * at_least}{value_text(value, *errors, per=N_CM3, digits=OF_ERROR if at_least else OF_VALUE)}"
 
 
 def fraction_text(fraction: float | None) -> str:

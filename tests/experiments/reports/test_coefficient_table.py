@@ -66,7 +66,7 @@ def test_bounds_do_not_mix_with_values() -> None:
     assert (mixed.value, mixed.at_least, mixed.bounds) == (1e6, False, 1)
     bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert (bounds.value, bounds.at_least, bounds.bounds, bounds.std_error) == (2e6, True, 3, None)
-    assert gathered_text(bounds) == "≥ 2.000"
+    assert gathered_text(bounds) == "≥ 2.0"
 
 
 def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:

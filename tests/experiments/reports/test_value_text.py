@@ -4,7 +4,7 @@ from math import inf, nan
 
 import pytest
 
-from experiments.reports.value_text import fraction_text, value_text
+from experiments.reports.value_text import coefficient_text, fraction_text, value_text
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,12 @@ def test_an_error_has_two_digits_and_the_value_ends_with_the_finest(
 
 def test_units_apply_to_value_and_errors() -> None:
     assert value_text(1.2e6, 3.4e4, per=1e6) == "1.200 ± 0.034"
+
+
+def test_a_lower_bound_without_an_error_has_two_digits() -> None:
+    assert coefficient_text(534_612.0, None, at_least=True) == "≥ 0.53"
+    assert coefficient_text(534_612.0, 71_000.0, at_least=True) == "≥ 0.535 ± 0.071"
+    assert coefficient_text(534_612.0) == "0.5346"
 
 
 @pytest.mark.parametrize("error", [None, nan, inf])

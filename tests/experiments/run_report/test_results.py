@@ -105,7 +105,7 @@ def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers() -> None:
 
 def test_bounds_and_invalid_estimates_are_no_values() -> None:
     run = run_of([stride("a", 0.5e6, 0.5e6, at_least=True), stride("b", 0.2e6, 0.2e6, valid=False)])
-    assert report_of([run]).tables[0].rows["k_s"].tolist() == ["≥ 0.5000", "-"]
+    assert report_of([run]).tables[0].rows["k_s"].tolist() == ["≥ 0.50", "-"]
 
 
 def test_the_hardest_reaction_to_a_cause_counts() -> None:
