@@ -10,6 +10,7 @@ from textual.pilot import Pilot
 from command_line.watch.feed import Feed
 from command_line.watch.screen_app import WatchApp
 from control.records import JOINTS
+from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.drive_presets import calibrated
 from tests.command_line.watch.served_robot import ServedRobot, walking_robot
@@ -38,9 +39,8 @@ async def save(pilot: Pilot[int], path: Path) -> None:
 
 
 def main(folder: Path) -> None:
-    robot = ServedRobot(
-        walking_robot(parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8"))))
-    )
+    configuration = parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
+    robot = ServedRobot(walking_robot(configuration, Failures(configuration.bus)))
     with TemporaryDirectory(prefix="mud-") as name, robot.served(socket := Path(name) / "s"):
         app = WatchApp(Feed(socket, PERIOD_S), ["left", "right"], PERIOD_S, lambda method: method)
         asyncio.run(draw(app, robot, folder))

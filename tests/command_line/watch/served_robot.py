@@ -9,6 +9,7 @@ from typing import Any
 
 from control.controller import WalkOrder
 from control.modes import Mode
+from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration, StatusParameters
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
@@ -24,13 +25,13 @@ NOBODY = Caller(0, Peer(1, 1, frozenset()), Level.DRIVE)
 SLEEP_S = 0.002
 
 
-def resting_robot(configuration: Configuration) -> Lockstep:
+def resting_robot(configuration: Configuration, failures: Failures | None = None) -> Lockstep:
     track = Track([(0.35, MUDS["48.5"]), (5.0, MUDS["53.1"])])
-    return Lockstep(configuration, track)
+    return Lockstep(configuration, track, failures=failures)
 
 
-def walking_robot(configuration: Configuration) -> Lockstep:
-    robot = resting_robot(configuration)
+def walking_robot(configuration: Configuration, failures: Failures | None = None) -> Lockstep:
+    robot = resting_robot(configuration, failures)
     robot.arm()
     robot.walk(WalkOrder(0.03, adaptive=True))
     robot.run_for(7.0)
