@@ -103,13 +103,21 @@ def strip_text(history: History, width: int, names: Sequence[str]) -> Text:
     last = max(*pieces, min(pieces) if x_m is None else int(x_m // PIECE_M))
     first = max(min(pieces), last - room + 1)
     cells = min(room // (last - first + 1), 6)
-    end = f" {(last + 1) * PIECE_M:.2f} m"
-    scale = Text(f"{first * PIECE_M:.2f} m".ljust((last + 1 - first) * cells - len(end)) + end, "dim")
-    if x_m is not None and 0 <= (cell := int((x_m / PIECE_M - first) * cells)) < room:
-        scale.pad_right(max(0, cell + 1 - len(scale)))
-        scale = Text.assemble(scale[:cell], ("▲", "bold"), scale[cell + 1 :])
+    scale = _scale(first, last, cells, x_m, room)
     rows = [Text.assemble((f"mud {name} ", "bold"), *_blocks(history, name, first, last, cells)) for name in names]
     return Text("\n", no_wrap=True, overflow="crop").join([*rows, Text.assemble("        ", scale)])
+
+
+def _scale(first: int, last: int, cells: int, x_m: float | None, room: int) -> Text:
+    """Return the ends of the shown path, the last one left of the robot's position if that is where it would stand."""
+    start, end, length = f"{first * PIECE_M:.2f} m", f" {(last + 1) * PIECE_M:.2f} m", (last + 1 - first) * cells
+    cell = -1 if x_m is None else int((x_m / PIECE_M - first) * cells)
+    is_beside = length - len(end) <= cell and len(start + end) <= cell
+    scale = Text(start.ljust((cell if is_beside else length) - len(end)) + end, "dim")
+    if 0 <= cell < room:
+        scale.pad_right(max(0, cell + 1 - len(scale)))
+        scale = Text.assemble(scale[:cell], ("▲", "bold"), scale[cell + 1 :])
+    return scale
 
 
 def _blocks(history: History, name: str, first: int, last: int, cells: int) -> list[tuple[str, str]]:

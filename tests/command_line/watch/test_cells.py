@@ -1,6 +1,7 @@
 """The cells of the screen: the most important text comes first, and values that are not known look so."""
 
 import copy
+import re
 from collections import deque
 from typing import Any
 
@@ -12,7 +13,7 @@ from command_line.robot_text import BAD, OLD
 from command_line.watch.bars import bars
 from command_line.watch.history import History, Sample
 from command_line.watch.joint_plots import View
-from command_line.watch.mud_cells import BOUND, coefficient_rows, force_text, trend
+from command_line.watch.mud_cells import BOUND, coefficient_rows, force_text, strip_text, trend
 from command_line.watch.plain_lines import plain_line
 from command_line.watch.robot_cells import alarm_text, drive_rows, faults_text, machine_text
 from control.faults import FaultKind
@@ -55,6 +56,13 @@ def test_faults_of_one_cause_are_one_alarm(walked: ServedRobot, history: History
     first, advice = alarm_text(history, NOW_S).plain.split("\n")
     assert first.startswith(" FAULT ") and "8 faults" in first
     assert advice.startswith("-> ")
+
+
+@pytest.mark.parametrize("ahead_m", [0.0, 0.01, 0.02, 0.03, 0.04, 0.05])
+def test_the_mark_of_the_robot_leaves_the_numbers_of_the_path_whole(history: History, ahead_m: float) -> None:
+    history.status["body_x_m"] = max(stride["place_m"] for stride in history.strides) + ahead_m
+    scale = strip_text(history, 80, ("k_s",)).plain.splitlines()[-1]
+    assert "▲" in scale and len(re.findall(r"\d\.\d\d m", scale)) == 2
 
 
 def test_a_cut_of_the_power_takes_the_place_of_the_mode(history: History, capsys: pytest.CaptureFixture[str]) -> None:
