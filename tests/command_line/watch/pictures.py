@@ -18,6 +18,7 @@ from tests.folders import EXAMPLE_CONFIGURATION
 
 PERIOD_S = 0.1
 WALK_S = 30.0  # fills the plots
+SILENT_S = 1.2  # of the robot's time, which a busy machine slows down
 
 
 async def draw(app: WatchApp, robot: ServedRobot, folder: Path) -> None:
@@ -29,7 +30,9 @@ async def draw(app: WatchApp, robot: ServedRobot, folder: Path) -> None:
         await pilot.press("j", "j", "j")
         for joint in JOINTS:
             robot.robot.fail(joint, "off", 60.0)
-        await pilot.pause(2.0)
+        silent_s = robot.robot.now_s + SILENT_S
+        while robot.robot.now_s < silent_s:
+            await pilot.pause(PERIOD_S)
         await save(pilot, folder / "watch_fault.svg")
 
 
