@@ -25,15 +25,17 @@ def test_a_label_is_no_pattern_and_may_be_left_out() -> None:
     assert EncoderCounts(1e-3).accept(b" +250 ", 0.0) == pytest.approx(0.25)
 
 
-def test_a_jump_is_accepted_once_it_stays_and_is_counted() -> None:
+@pytest.mark.parametrize(
+    ("lines", "positions_m", "jumps"),
+    [
+        (b"50000 5000 50010 3 5 7", [0.5, None, 0.5001, None, 5e-5, 7e-5], 1),
+        (b"50000 0 50010 0 50020", [0.5, None, 0.5001, None, 0.5002], 0),
+    ],
+)
+def test_a_jump_is_accepted_once_it_stays_and_counted(
+    lines: bytes, positions_m: list[float | None], jumps: int
+) -> None:
     counts = EncoderCounts(1e-5)
-    reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
-    assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
-    assert (counts.malformed, counts.jumps) == (2, 1)
-
-
-def test_a_spike_is_rejected_again_where_counts_came_in_between() -> None:
-    counts = EncoderCounts(1e-5)
-    reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"0", b"50010", b"0", b"50020"])]
-    assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(0.5002)]
-    assert (counts.malformed, counts.jumps) == (2, 0)
+    reported = [counts.accept(line, 0.01 * i) for i, line in enumerate(lines.split())]
+    assert reported == [each and pytest.approx(each) for each in positions_m]
+    assert (counts.malformed, counts.jumps) == (2, jumps)
