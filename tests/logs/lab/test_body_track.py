@@ -1,7 +1,6 @@
 """A known advance, sinking and pitch are recovered from a capture at any heading."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -106,14 +105,3 @@ def test_a_capture_that_was_lost_is_reported_once(tmp_path: Path) -> None:
     (finding,) = log.findings
     assert finding.kind is FindingKind.POSE and finding.time_s == 1.5
     assert "lost the body for 0.29 s, in 2 periods" in finding.text
-
-
-@pytest.mark.parametrize(("leap_m", "lost"), [(0.03, range(300, 420)), (0.01, ())])
-def test_a_pose_that_is_constant_and_then_leaps_was_lost(leap_m: float, lost: Sequence[int], tmp_path: Path) -> None:
-    columns = lab_columns()
-    add_pose(columns, 0.0, 0.0, 0.0)
-    x = columns["OptitrackPosition_x"]
-    x[300:420] = x[300] + 0.001
-    x[420:] += leap_m
-    log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
-    assert np.flatnonzero(np.isnan(log.body_x_m)).tolist() == [*lost]
