@@ -117,7 +117,10 @@ def assert_found(stride: StrideEstimate, mud: Mud) -> None:
 @pytest.mark.parametrize("depth_m", [0.025, 0.03, 0.04, 0.05])
 @pytest.mark.parametrize("mud", [MUD, Mud(0.25e6, 0.137e6, 0.25e6, 0.0), Mud(2.2e6, 1.1e6, 2.06e6, -0.005)])
 def test_the_three_coefficients_of_known_mud_are_found(mud: Mud, depth_m: float) -> None:
-    assert_found(one(triggered(walked(depth_m), mud)), mud)
+    """The stride before, in another mud, does not count."""
+    flipper, firm = estimator(), Mud(3.0e6, 2.0e6, 2.5e6)
+    assert_found(one(triggered(walked(), firm), flipper), firm)
+    assert_found(one(triggered(walked(depth_m), mud), flipper), mud)
 
 
 def test_the_load_is_the_force_that_the_mud_exerts() -> None:

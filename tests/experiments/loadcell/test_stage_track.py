@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.stage_track import PositionedProfile
-from experiments.loadcell.strokes import NO_PROFILE, StagePositions, StageSettings
+from experiments.loadcell.stage_track import PositionedProfile, common_alignment
+from experiments.loadcell.strokes import NO_PROFILE, Alignment, StagePositions, StageSettings
 
 TIMES_S = np.arange(0.0, 2.0, 0.01)
 
@@ -40,3 +40,9 @@ def test_a_single_wrong_position_is_removed() -> None:
     positions_m = 0.1 * TIMES_S
     positions_m[70] += 0.004
     assert track_of(TIMES_S, positions_m).positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
+
+
+def test_the_alignment_of_sixteen_trials_is_four_times_as_certain_as_that_of_one() -> None:
+    lag_s, rate, *uncertainties = common_alignment([Alignment(0.02, 0.1, 0.032, 0.4)] * 16)
+    assert (lag_s, rate) == (0.02, 0.1)
+    assert uncertainties == pytest.approx([1.25 * 0.008, 1.25 * 0.1])
