@@ -9,7 +9,7 @@ import moteus  # type: ignore[import-untyped]
 import pytest
 
 from drivers.moteus.parameters import MoteusParameters
-from tests.simulation.vendors.vendor_bench import VendorBench, vendor_bench
+from tests.simulation.vendors.vendor_bench import VendorBench, vendor_bench, wait_until
 
 TORQUE_NM = 0.1
 CONSTANT_NM_A = 0.0719
@@ -44,12 +44,10 @@ async def operate(bench: VendorBench) -> None:
             await drive.set_stop()
             assert (await drive.query()).values[registers.MODE] == moteus.Mode.STOPPED
         await drive.set_current(q_A=1.0, d_A=0.0)
-        await asyncio.sleep(0.05)
-        assert bench.torque_nm == pytest.approx(CONSTANT_NM_A)
+        wait_until(lambda: bench.torque_nm == pytest.approx(CONSTANT_NM_A) and bench.velocity_rad_s > 0.01, "a current")
         for brake in (drive.set_brake, drive.set_zero_velocity):
             await brake()
-            await asyncio.sleep(0.05)
-            assert bench.torque_nm * bench.velocity_rad_s < 0.0
+            wait_until(lambda: bench.torque_nm * bench.velocity_rad_s < 0.0, "a brake")
         await drive.set_stop()
         unknown = await drive.custom_query({0x3FF: moteus.F32})
         assert 0x3FF not in unknown.values
