@@ -72,6 +72,7 @@ class Machine:
         emulated = self._accelerator == "tcg"
         command += ["-append", f"{KERNEL_OPTIONS} {STRETCHED_CLOCK if emulated else ''}"]
         command += ["-serial", "stdio", "-device", "virtio-serial"]
+        command += ["-object", "can-bus,id=bus", *("-device", "kvaser_pci,canbus=bus") * 2]  # can0, can1
         command += ["-drive", f"file={self._image},if=virtio,format=raw"]
         command += ["-chardev", f"socket,id=commands,path={port},server=on,wait=off"]
         command += ["-device", "virtserialport,chardev=commands,name=commands"]

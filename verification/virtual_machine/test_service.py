@@ -34,6 +34,15 @@ def test_both_buses_are_up_by_the_network_files_alone(booted: Robot) -> None:
     assert {link["ifname"] for link in links if "UP" in link["flags"]} == {"vcan0", "vcan1"}
 
 
+def test_two_controllers_are_set_up_by_the_network_files_alone(booted: Robot) -> None:
+    """QEMU emulates them: the robot's own buses are virtual ones, which have neither bit rate nor bus-off."""
+    links = json.loads(booted.shell("ip -json -details link show type can"))
+    assert [link["ifname"] for link in links if "UP" in link["flags"]] == ["can0", "can1"]
+    for link in links:
+        settings = link["linkinfo"]["info_data"]
+        assert (settings["bittiming"]["bitrate"], settings["restart_ms"], link["txqlen"]) == (1_000_000, 100, 32)
+
+
 def test_every_line_of_check_is_good(booted: Robot) -> None:
     answer = booted.operate("check")
     assert answer.status == 0, answer
