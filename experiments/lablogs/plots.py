@@ -16,7 +16,7 @@ from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import members_of
 from experiments.reports.mud_styles import LABELS, MARKS, name_decades
-from experiments.reports.style import FAINT, INK, WIDTH_IN
+from experiments.reports.style import FAINT, INK, WIDTH_IN, say_empty
 from experiments.reports.value_text import N_CM3
 
 COLOURS = dict(zip(COEFFICIENTS, ("C0", "C1", "C2"), strict=True))
@@ -96,7 +96,7 @@ def _draw_pairs(panel: Axes, pairs: DataFrame, coefficient: str) -> None:
     drawn = pairs[is_drawn & (pairs["coefficient"] == coefficient)]
     if drawn.empty:
         panel.set(xticks=[], yticks=[])
-        panel.text(0.5, 0.5, "no pair of values", transform=panel.transAxes, ha="center", color=FAINT)
+        say_empty(panel, "no pair of values")
         return
     left, right, left_error, right_error = (
         drawn[name] / N_CM3 for name in ("value_left", "value_right", "repeatability_left", "repeatability_right")

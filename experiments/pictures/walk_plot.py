@@ -32,6 +32,7 @@ from experiments.reports.style import (
     SURFACE,
     UP,
     save_picture,
+    say_empty,
 )
 
 WIDTH_IN, PANEL_IN = 10.0, 1.55
@@ -156,7 +157,7 @@ def _draw_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
         panel.errorbar(stamps_s, shown, bars, fmt="^" if at_least else "o", markersize=5, **look)
     panel.set_ylim(0.0, top)
     if not known:
-        panel.text(0.5, 0.5, "no estimate", transform=panel.transAxes, ha="center", va="center", color=FAINT)
+        say_empty(panel, "no estimate")
     if walk.noticed_s:
         look = MARKS if len(walk.noticed_s) > MOST_DASHES else DASHES
         panel.plot([], [], **look, label="another mud noticed")

@@ -40,6 +40,11 @@ STYLE: dict[Any, Any] = {
 }
 
 
+def say_empty(panel: Any, text: str) -> None:
+    """Write in the middle of a panel why it shows nothing."""
+    panel.text(0.5, 0.5, text, transform=panel.transAxes, ha="center", va="center", color=FAINT)
+
+
 def save_picture(draw: Callable[[], Any], path: Path) -> None:
     """Draw a figure of matplotlib in the common style and save it as a PNG, SVG or PDF file."""
     from matplotlib import rc_context  # slow to import

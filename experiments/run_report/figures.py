@@ -18,7 +18,7 @@ from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, mark_of, name_muds
-from experiments.reports.style import FAINT, WIDTH_IN
+from experiments.reports.style import FAINT, WIDTH_IN, say_empty
 from experiments.reports.value_text import N_CM3
 from experiments.run_report.results import SPEED, Entry, run_labels
 from experiments.run_report.run import Run
@@ -87,7 +87,7 @@ def _draw_samples(
         residuals.plot(np.concatenate(places), remains, **looks[str(mud)])
         drawn.append((torques, remains))
     if len(drawn) == 1:
-        fit.text(0.5, 0.5, "no fit", transform=fit.transAxes, ha="center", va="center", color=FAINT)
+        say_empty(fit, "no fit")
     residuals.axhline(0.0, color=FAINT, linewidth=0.8)
     torques, remains = map(np.concatenate, zip(*drawn, strict=True))
     return torques, remains

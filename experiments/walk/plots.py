@@ -15,7 +15,7 @@ from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import LABELS, PHASE_NAMES, line_of, looks_of
-from experiments.reports.style import FAINT, INK
+from experiments.reports.style import FAINT, INK, say_empty
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3
 from experiments.study.notebook import Entry
@@ -55,7 +55,7 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: f
     time_s = profile["time_s"] - begun_s
     panels[0].set_ylabel("body (cm)")
     if walk["start_m"] is None:
-        panels[0].text(0.5, 0.5, "no pose", transform=panels[0].transAxes, ha="center", color=FAINT)
+        say_empty(panels[0], "no pose")
     else:
         panels[0].plot(time_s, 100.0 * (profile["body_x_m"] - walk["start_m"]), color=INK, linewidth=1.2)
     upward_n = profile["force_z_n"].mask(profile["phase"] == Phase.STANCE)
