@@ -70,8 +70,15 @@ def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
 
 def check_item(identity: str, ok: bool, text: str, fix: str, *, warns: bool = False) -> dict[str, Any]:
     """Return one line of `mudskipper check`, with the fix of what blocks arming, also by force, or is a warning."""
-    shown = {"id": identity, "ok": ok, "warning": warns, "text": text, "fix": fix if warns or not ok else ""}
-    return shown | {"mandatory": not ok, "cause": ""}
+    return {
+        "id": identity,
+        "ok": ok,
+        "warning": warns,
+        "text": text,
+        "fix": fix if warns or not ok else "",
+        "mandatory": not ok,
+        "cause": "",
+    }
 
 
 def cause_report(cause: Cause) -> dict[str, Any]:
