@@ -55,6 +55,12 @@ def outcome_of(walk: RecordedWalk, stride: Stride) -> Outcome:
     return Outcome.SLIPPING if step_m / full_m < FULL_FRACTION else Outcome.GOOD
 
 
+def of_both_flippers(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Stride]:
+    """Return strides as those of the robot: stuck, if either flipper was."""
+    stuck = {stride["index"] for stride in walk.strides if not stride["released"]}
+    return [stride | {"released": stride["index"] not in stuck} for stride in strides]
+
+
 def geometric_step_m(walk: RecordedWalk, stride: Stride) -> float:
     """Return the step with a plate that does not move in the mud during the stance: l (sin α₀ - sin α₁).
 

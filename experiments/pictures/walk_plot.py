@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from control.records import COEFFICIENTS
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import Floats, RecordedWalk
-from experiments.pictures.stride_choice import Outcome, Stride, geometric_step_m, outcome_of
+from experiments.pictures.stride_choice import Outcome, Stride, geometric_step_m, of_both_flippers, outcome_of
 from experiments.pictures.walk_trace import rows_of_curve
 from experiments.reports.style import (
     FAINT,
@@ -197,10 +197,8 @@ def _draw_position(panel: Axes, walk: RecordedWalk) -> None:
 
 
 def _draw_steps(panel: Axes, walk: RecordedWalk) -> None:
-    """Draw a bar from the start of each stride to its end, in the colour of its outcome: stuck, if any flipper was."""
-    stuck = {stride["index"] for stride in walk.strides if not stride["released"]}
-    own = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
-    known = [stride | {"released": stride["index"] not in stuck} for stride in own]
+    """Draw a bar from the start of each stride to its end, in the colour of its outcome."""
+    known = of_both_flippers(walk, [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])])
     for outcome in Outcome:
         own = [stride for stride in known if outcome_of(walk, stride) is outcome]
         starts_s, ends_s, steps_m = _columns(own, "t_start_s", "stamp_s", "step_m")

@@ -20,7 +20,7 @@ from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from experiments.lablogs.log_choice import LABEL
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_of_trace
-from experiments.pictures.stride_choice import Stride, outcome_of
+from experiments.pictures.stride_choice import Stride, of_both_flippers, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
 from experiments.reports.mud_names import mud_label, mud_name
 from experiments.run_report.supply_range import SupplyRange
@@ -165,20 +165,19 @@ def _describe_strides(walks: Sequence[RecordedWalk], layout: MudLayout | None) -
         by_index: dict[int, list[Stride]] = {}
         for row in sorted(walk.strides, key=lambda row: int(row["index"])):
             by_index.setdefault(row["index"], []).append(row)
-        starts_s = [rows[0]["t_start_s"] for rows in by_index.values()]
-        for (index, rows), end_s in zip(by_index.items(), [*starts_s, UNKNOWN][1:], strict=True):
-            first = rows[0]
-            together = first | {"released": all(row["released"] for row in rows)}
+        firsts = of_both_flippers(walk, [rows[0] for rows in by_index.values()])
+        ends_s = [*(first["t_start_s"] for first in firsts), UNKNOWN][1:]
+        for first, rows, end_s in zip(firsts, by_index.values(), ends_s, strict=True):
             found.append(
                 {
                     "walk": number,
-                    "index": index,
+                    "index": first["index"],
                     "mud": _mud_of(walk, layout, regions, first),
                     "start_s": walk.begun_s + first["t_start_s"],
                     "duration_s": end_s - first["t_start_s"],
                     "step_m": first["step_m"],
                     "depth_m": max(float(row["depth_m"]) for row in rows),
-                    "outcome": str(outcome_of(walk, together)),
+                    "outcome": str(outcome_of(walk, first)),
                     "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows),
                     "supply_v": min((v for row in rows if isfinite(v := row.get("supply_min_v", nan))), default=nan),
                 }

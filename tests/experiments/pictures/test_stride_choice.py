@@ -15,6 +15,7 @@ from experiments.pictures.stride_choice import (
     duration_s,
     geometric_step_m,
     moments_of,
+    of_both_flippers,
     outcome_of,
     rows_of,
 )
@@ -87,6 +88,12 @@ def test_a_stride_fails_below_half_of_the_geometric_step_or_where_the_flipper_st
 def test_on_a_fixed_base_no_stride_slips(released: bool, outcome: Outcome) -> None:
     walk = walk_of([stride_row(0, 0.0, released)])._replace(fixed_base=True)
     assert outcome_of(walk, walk.strides[0]) is outcome
+
+
+def test_a_stride_of_both_flippers_is_stuck_if_either_was() -> None:
+    walk = walk_of([stride_row(0, 0.11), stride_row(0, 0.11, False, flipper=0), stride_row(1, 0.11)])
+    outcomes = [outcome_of(walk, stride) for stride in of_both_flippers(walk, walk.own_strides)]
+    assert outcomes == [Outcome.STUCK, Outcome.GOOD]
 
 
 def test_the_clearest_stride_of_each_outcome_is_chosen() -> None:
