@@ -37,10 +37,11 @@ from control.bounds import Bounds
 from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import FLIPPERS, TWO_FLIPPERS, Rig
 from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
-from simulation.mud.carriage import Carriage, Vector, cross, dot, plate_directions
+from simulation.mud.carriage import Carriage, plate_directions
 from simulation.mud.clay import UNIT_WEIGHT_N_M3
 from simulation.mud.flipper_contact import NO_CONTACT
 from simulation.mud.ground_contact import Ground
+from simulation.mud.rigid_plate import Vector, cross, dot
 from simulation.mud.track import Track
 
 YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed

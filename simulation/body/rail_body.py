@@ -9,9 +9,10 @@ from typing import NamedTuple, Protocol
 
 from control.limits import clip
 from control.records import TWO_FLIPPERS, Rig
-from simulation.mud.carriage import Carriage, Vector
+from simulation.mud.carriage import Carriage
 from simulation.mud.flipper_contact import ContactForce
 from simulation.mud.ground_contact import Ground
+from simulation.mud.rigid_plate import Vector
 from simulation.mud.track import Track
 
 DRAG_STIFFNESS_N_M = 5000.0

@@ -14,10 +14,9 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from simulation.mud.rigid_plate import Attitude, Twist
+from simulation.mud.rigid_plate import Attitude, Twist, Vector, dot
 
 LEAST_UPRIGHT = 0.05  # a plate cannot lie flat: its strips would be endless
-Vector = tuple[float, float, float]
 
 
 class Carriage(NamedTuple):
@@ -27,15 +26,6 @@ class Carriage(NamedTuple):
     up: Vector  # the world's vertical
     velocity_m_s: Vector
     turning_rad_s: Vector
-
-
-def dot(one: Vector, other: Vector) -> float:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-def cross(one: Vector, other: Vector) -> Vector:
-    (a, b, c), (x, y, z) = one, other
-    return b * z - c * y, c * x - a * z, a * y - b * x
 
 
 def plate_directions(sweep_rad: float, adduction_rad: float) -> tuple[Vector, Vector, Vector]:

@@ -22,8 +22,7 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from simulation.mud.grounds.sand import added, along, horizontal
-from simulation.mud.rigid_plate import Attitude, Wrench
+from simulation.mud.rigid_plate import Attitude, Wrench, added, along, horizontal
 
 STIFFNESS_N_M = 20e3
 DAMPING_N_S_M = 15.0

@@ -16,11 +16,10 @@ from __future__ import annotations
 from math import acos, asin, atan2, copysign, cos, hypot, pi, sin
 from typing import NamedTuple
 
-from simulation.mud.carriage import Vector, cross, dot
+from simulation.mud.rigid_plate import LEVEL, Vector, added, along, cross, dot, horizontal
 
 LEAST = 0.02  # of the resistance along the motion: the smallest of the generic map is 0.054
 FRICTION = 0.4  # of the plate on sand, of the order of plastic's
-LEVEL = 1e-6  # a horizontal part that is smaller has no direction
 A00, A10, B11, B01, B_11 = 0.206, 0.169, 0.212, 0.358, 0.055
 C11, C01, C_11, D10 = -0.124, 0.253, 0.007, 0.088
 FLAT_DOWN = 0.87504  # of the spatial map with the table below
@@ -34,25 +33,6 @@ SPATIAL = (
      .02927, .95406, -.00131, -.11028, .01487, -.02730, .10911, -.04097, .07881, -.27519),
 )
 # fmt: on
-
-
-def along(vector: Vector, factor: float) -> Vector:
-    return vector[0] * factor, vector[1] * factor, vector[2] * factor
-
-
-def added(*vectors: Vector) -> Vector:
-    x, y, z = map(sum, zip(*vectors, strict=True))
-    return x, y, z
-
-
-def horizontal(up: Vector, *candidates: Vector) -> Vector:
-    """Return the direction of the first horizontal part that has one."""
-    for vector in (*candidates, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
-        level = added(vector, along(up, -dot(vector, up)))
-        length = hypot(*level)
-        if length > LEVEL:
-            return along(level, 1.0 / length)
-    raise ValueError("up: must not be zero")
 
 
 def generic_resistance(normal: Vector, up: Vector, direction: Vector) -> Vector:

@@ -14,11 +14,10 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import hypot
 
-from simulation.mud.carriage import Vector, dot
 from simulation.mud.ground_contact import GroundContact
-from simulation.mud.grounds.sand import Sand, added, along
+from simulation.mud.grounds.sand import Sand
 from simulation.mud.plate_panels import Corner
-from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench
+from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Vector, Wrench, added, along, dot
 
 YIELD_M = 0.003  # of a flat plate pushed down; a stiffer spring would ask for shorter steps
 Centre = tuple[float, float, float]  # ∫ζ dA, and where its middle is: outward, upward
