@@ -14,6 +14,7 @@ from mudskipper.ground_and_gait import Gait
 from operator_client.status_client import StatusClient
 
 POLL_S = 0.05
+RESTING = ("idle", "boot", "fault")  # modes without torque
 Report = dict[str, Any]
 
 
@@ -135,17 +136,26 @@ class Client:
     def wait_for(self, mode: str, timeout_s: float = 30.0) -> Report:
         """Return the status once the robot is in a mode such as "hold"; renew the lease meanwhile.
 
-        Raises TimeoutError, and at once a RuntimeError with the fault's name where a fault took the torque away.
+        Raises TimeoutError, and at once a RuntimeError with the cause where a fault or a disarm took the torque away.
         """
-        deadline_s = time.monotonic() + timeout_s
+        deadline_s, had_torque = time.monotonic() + timeout_s, False
         while (report := self.status())["mode"] != mode:
-            if report["mode"] == "fault" and report["fault"] and mode != "idle":
-                raise RuntimeError("{name}: {message}".format(**report["fault"]))
+            if problem := _why_without_torque(report, had_torque) if mode not in RESTING else "":
+                raise RuntimeError(problem)
+            had_torque = report["mode"] not in RESTING
             if time.monotonic() > deadline_s:
                 raise TimeoutError(f"the robot is in mode {report['mode']} after {timeout_s:g} s, not in {mode}")
             self.renew()
             time.sleep(POLL_S)
         return report
+
+
+def _why_without_torque(report: Report, had_torque: bool) -> str:
+    """Return what took the torque away, or an empty text: a robot that has yet to arm had none."""
+    if report["mode"] == "fault" and report["fault"]:
+        return "{name}: {message}".format(**report["fault"])
+    was_lost = had_torque and report["mode"] in RESTING
+    return (report["notice"] or f"the torque was switched off: the robot is {report['mode']}") if was_lost else ""
 
 
 def _texts(trial: Mapping[str, object]) -> dict[str, str]:

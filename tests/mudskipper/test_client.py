@@ -48,6 +48,15 @@ def test_a_wait_for_torque_ends_at_once_with_the_fault_that_took_it_away(
         robot.wait_for(wanted, timeout_s=0.0)
 
 
+def test_a_wait_for_the_hold_ends_at_once_where_another_program_disarms(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reports = iter([{"mode": mode, "fault": None, "notice": ""} for mode in ("idle", "arming", "idle")])
+    monkeypatch.setattr(mudskipper.Client, "status", lambda _: next(reports))
+    with mudskipper.Client(bench.socket) as robot, pytest.raises(RuntimeError, match="switched off"):
+        robot.wait_for("hold")
+
+
 def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUDSKIPPER_SOCKET", str(bench.socket))
     with mudskipper.Client() as robot:
