@@ -12,7 +12,7 @@ from command_line.errors import report
 from command_line.function_options import given_options
 from command_line.json_output import JSON, Answer, answers, print_error
 from command_line.parser import build_parser
-from command_line.screen import complaints
+from command_line.screen import complaints, drop_output
 
 atexit.register(gc.freeze)  # a process that ends looks for garbage twice, a tenth of the time of `status`
 
@@ -56,8 +56,8 @@ def _run(given: Sequence[str]) -> int:
         return ended.print(getattr(options, "json", False)) if isinstance(ended, Answer) else ended
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:
+        drop_output()
         return exit_codes.OK
     except Exception as problem:  # noqa: BLE001 - `report` raises again what it does not know
         return report(problem)

@@ -19,6 +19,11 @@ BAR_WIDTH = 20  # characters
 complaints: list[str] = []  # what this command has complained of: with --json it is the reason why it failed
 
 
+def drop_output() -> None:
+    """Discard what is printed from now on: its reader, such as `head`, has closed standard output."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def coloured(text: str, colour: str) -> str:
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
         return text

@@ -14,7 +14,7 @@ from command_line.errors import CommandError
 from command_line.json_output import Answer
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, mode_word, position_text, stride_text
-from command_line.screen import complain
+from command_line.screen import complain, drop_output
 from operator_client.status_client import CallRefusedError, StatusClient
 
 LEASE_S = 1.0
@@ -47,15 +47,21 @@ def attend_pose(client: StatusClient, law: LawStep, period_s: float) -> Answer:
 def _attend(
     client: StatusClient, as_json: bool, law: LawStep | None, modes: Sequence[str] = MOVING, period_s: float = 0.0
 ) -> Answer:
-    """Renew the lease to the end, which a law that fails and Ctrl-C bring about, and until the robot is at rest."""
+    """Renew the lease until the robot is at rest: a law that fails, Ctrl-C and a closed output stop it."""
     status = exit_codes.OK
     try:
         _renew(client, as_json, law, modes, period_s)
     except LawError as problem:
-        complain(f"{problem}; the robot stops")
+        complain(str(problem))
+        client.call("lease", for_s=LEASE_S)  # refused after a take-over: the stop would be one of the other program
         client.call("stop")
         status = exit_codes.REFUSED
     except KeyboardInterrupt:
+        client.call("stop")
+        status = exit_codes.INTERRUPTED
+    except BrokenPipeError:
+        drop_output()
+        complain("the reader of the output has closed it: the robot stops")
         client.call("stop")
         status = exit_codes.INTERRUPTED
     report = _renew(client, as_json)

@@ -100,6 +100,17 @@ def test_ctrl_c_stops_the_robot_and_waits_for_it(bench: Bench) -> None:
     assert bench.wait_for(lambda report: True)["mode"] == "hold"
 
 
+def test_a_reader_that_closes_the_output_stops_the_robot(bench: Bench) -> None:
+    bench.run("arm")
+    with attended(bench) as walk:
+        assert walk.stdout and walk.stderr
+        walk.stdout.close()
+        assert walk.wait(LONGEST_S) == exit_codes.INTERRUPTED
+        assert "closed it" in walk.stderr.read()
+    report = bench.wait_for(lambda report: True)
+    assert (report["mode"], report["fault"], report["lease"]) == ("hold", None, None)
+
+
 def test_another_terminal_gets_no_second_attended_walk_and_ends_the_first_by_a_stop(bench: Bench) -> None:
     bench.run("arm")
     with attended(bench) as walk:

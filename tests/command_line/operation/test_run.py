@@ -28,6 +28,7 @@ class WalkOfTwoStrides(StatusClient):
     def __init__(self, _: Path, refusal: str = "") -> None:
         self.orders: list[dict[str, Any]] = []
         self._refusal, self._asked, self._stopped = refusal, 0, False
+        self.lease_refusal = ""
 
     def call(self, method: str, /, **params: Any) -> Any:
         if method == "status":
@@ -37,6 +38,8 @@ class WalkOfTwoStrides(StatusClient):
         if method == "strides":
             closed = 10 + 2 * min(2, self._asked // 2)
             return [{"flipper": "left", "number": number} for number in range(params["since"], closed)]
+        if method == "lease" and self.lease_refusal:
+            raise CallRefusedError(self.lease_refusal)
         if method == "stride":
             if self._refusal:
                 raise CallRefusedError(self._refusal)
@@ -143,6 +146,19 @@ def test_a_program_that_takes_the_robot_over_is_not_stopped(daemon: WalkOfTwoStr
     daemon._refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
     with pytest.raises(CallRefusedError, match="uid 7"):
         run.run(law(tmp_path, "return 0.02"), socket=tmp_path)
+    assert not daemon._stopped
+
+
+def test_nor_by_a_law_that_fails_meanwhile(
+    daemon: WalkOfTwoStrides, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(strides: Any) -> None:
+        daemon.lease_refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(run, "load_law", lambda target: (failing, 0.0))
+    with pytest.raises(CallRefusedError, match="uid 7"):
+        run.run("", socket=tmp_path)
     assert not daemon._stopped
 
 
