@@ -63,6 +63,16 @@ class Ground(_Tables):
         read_world(self.tables)
 
 
+World = Ground | str | Path | Mapping[str, Any]
+
+
+def ground_of(world: World) -> Ground:
+    """Return the ground of a world file or of its tables. Raises ConfigurationError."""
+    if isinstance(world, Ground):
+        return world
+    return Ground(**world) if isinstance(world, Mapping) else Ground(world)
+
+
 class Gait(_Tables):
     """A gait: a gait file or the name of one that ships, keywords with its keys, or both, where the keywords count.
 

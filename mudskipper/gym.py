@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from control.records import COEFFICIENTS, FLIPPERS
 from experiments.pictures.side_view import view_from_side
 from experiments.robot.lockstep_robot import simulated_configuration
-from mudskipper.ground_and_gait import Ground
+from mudskipper.ground_and_gait import World, ground_of
 from mudskipper.stride_walks import DaemonWalk, SimulatedWalk, Stride, Tables
 from simulation.harness.direct import Direct
 from simulation.harness.lockstep import Lockstep
@@ -71,14 +71,14 @@ class MudWalk(gymnasium.Env[Array, Array]):
         render_mode: str | None = None,
         backend: Backend = "lockstep",
         duration_s: float = DURATION_S,
-        world: Ground | Tables | None = None,
+        world: World | None = None,
         adaptive: bool = False,
         socket: str | Path | None = None,
         operated: bool = False,
     ) -> None:
         """An episode ends with the first stride after `duration_s`: who walks further was faster.
 
-        Each episode has a random world unless a `world` is given, a Ground or the tables of its file.
+        Each episode has a random world unless a `world` is given, a Ground, a world file or its tables.
 
         `adaptive`: the robot's own method chooses, and actions are ignored; to compare a policy with it.
         """
@@ -92,7 +92,7 @@ class MudWalk(gymnasium.Env[Array, Array]):
         self.action_space = Box(-1.0, 1.0, (len(ACTION),), np.float32)
         self.observation_space = Box(-LARGEST, LARGEST, (len(OBSERVATION),), np.float32)
         self._backend, self._episode_s, self._adaptive = backend, duration_s, adaptive
-        self._world = world.tables if isinstance(world, Ground) else world
+        self._world = None if world is None else ground_of(world).tables
         self._socket = None if socket is None else Path(socket)
         self._geometry = simulated_configuration().geometry
         self._walk: SimulatedWalk | DaemonWalk | None = None

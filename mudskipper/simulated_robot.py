@@ -1,23 +1,21 @@
 """Starts a simulated robot and its daemon for a program of one's own."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import tomlkit
 
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import read_text
 from mudskipper.client import POLL_S, Client
-from mudskipper.ground_and_gait import Ground
+from mudskipper.ground_and_gait import World, ground_of
 from simulation.harness.local_robot import LocalRobot
 from simulation.harness.local_setup import local_copy
 
 READY_S = 30.0
-World = Ground | str | Path | Mapping[str, Any]
 
 
 @contextmanager
@@ -65,8 +63,6 @@ def _world_file(world: World | None, folder: Path) -> Path | None:
     """Return the checked file of a world. Raises ConfigurationError."""
     if world is None:
         return None
-    if not isinstance(world, Ground):
-        world = Ground(**world) if isinstance(world, Mapping) else Ground(world)
     path = folder / "world.toml"
-    path.write_text(tomlkit.dumps(world.tables), encoding="utf-8")
+    path.write_text(tomlkit.dumps(ground_of(world).tables), encoding="utf-8")
     return path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from firmware_host.configuration.file_problems import ConfigurationError
 from mudskipper.client import Client
+from mudskipper.ground_and_gait import Ground
 from mudskipper.gym import ACTION, MudWalk, _observation
 from mudskipper.stride_walks import SimulatedWalk, Stride
 from tests.folders import ROOT
@@ -52,6 +55,15 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
 def test_a_walk_that_ends_before_its_first_stride_is_observed_as_unknown() -> None:
     felt = _observation(Stride([], 0.0, 1.0, 0.0, "holding", 0.0))
     assert felt.tolist() == [0.0] * 3 + [1.0] * 3 + [0.0] * 6 and MudWalk().observation_space.contains(felt)
+
+
+def test_a_world_is_a_file_its_tables_or_a_ground(tmp_path: Path) -> None:
+    path = tmp_path / "world.toml"
+    path.write_text("[[segment]]\nstart_m = 0.0\nend_m = 10.0\nstrength_pa = 900.0\n", encoding="utf-8")
+    for world in (str(path), path, mud(900.0), Ground(path)):
+        assert MudWalk(world=world)._world == mud(900.0)
+    with pytest.raises(ConfigurationError, match="strength_pa"):
+        MudWalk(world=mud(1.0))
 
 
 def test_the_same_seed_gives_the_same_walk_and_another_seed_another_ground() -> None:
