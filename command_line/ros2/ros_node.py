@@ -6,6 +6,7 @@ noticed by their tokens: another domain, or another definition of a message.
 """
 
 import json
+import re
 import time
 from collections.abc import Callable
 from hashlib import blake2b
@@ -33,7 +34,7 @@ from firmware_host.log.schema import TEXT, Field, RowKind
 TRIGGER = "std_srvs/srv/Trigger"
 TRIGGER_HASH = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"  # of ROS 2 Jazzy's std_srvs
 RESPONSE = RowKind("", f"{TRIGGER}_Response", (Field("success", "bool"), Field("message", TEXT)))
-PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "serial", "unixsock-stream", "unixpipe", "vsock")  # Zenoh's
+ADDRESS = re.compile(r"(tcp|udp|tls|quic|ws)/.+:\d+([?#].*)?|(serial|unixsock-stream|unixpipe|vsock)/.+")  # Zenoh's
 RETRY_S = 1.0  # between two attempts to reach the router
 Act = Callable[[], tuple[bool, str]]  # returns whether it succeeded, and a message
 
@@ -43,7 +44,7 @@ def connect(router: str) -> zenoh.Session:
     configuration = zenoh.Config()
     try:
         configuration.insert_json5("connect/endpoints", json.dumps([router]))
-        is_address = router.partition("/")[0] in PROTOCOLS
+        is_address = bool(ADDRESS.fullmatch(router))
     except zenoh.ZError:
         is_address = False
     if not is_address:

@@ -235,6 +235,6 @@ def test_a_router_that_comes_later_is_waited_for(monkeypatch: pytest.MonkeyPatch
     assert len(said) == 1 and address in said[0]
 
 
-@pytest.mark.parametrize("address", ["nonsense", "tpc/localhost:7447"])
+@pytest.mark.parametrize("address", ["nonsense", "tpc/localhost:7447", "tcp/localhost"])
 def test_a_malformed_address_is_one_sentence(address: str) -> None:
     assert f"--router {address}" in failure("ros2", "--router", address, status=exit_codes.USAGE)
