@@ -102,7 +102,7 @@ def _perform(robot: LocalRobot, track: Track, depth_cm: float | None) -> tuple[R
                 raise RuntimeError(f"{fault} {busy}; close other programs and try again.") from None
     except KeyboardInterrupt:
         robot.end()
-        if status := robot.daemon.returncode:
+        if (status := robot.daemon.returncode) not in (0, -signal.SIGTERM):  # the latter before it handles signals
             state = f"stopped, but the daemon ended with status {status}"
         raise KeyboardInterrupt(state) from None
     finally:
