@@ -27,10 +27,11 @@ KeyValues = Annotated[
 
 
 def trial_text(trial_of: Mapping[str, Mapping[str, str]]) -> str:
-    """Return descriptions side by side, each below its head."""
+    """Return descriptions side by side, each below its head if it has one."""
     keys = dict.fromkeys(key for described in trial_of.values() for key in described)
     rows = [[key, *(described.get(key, "-") for described in trial_of.values())] for key in keys]
-    return table([["", *trial_of], *rows]) if rows else "no description is set"
+    head = [["", *trial_of]] if any(trial_of) else []
+    return table([*head, *rows]) if rows else "no description is set"
 
 
 def trial(

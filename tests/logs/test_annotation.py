@@ -90,6 +90,7 @@ def test_what_cannot_be_annotated_stays_as_it_was(log: Path, tmp_path: Path) -> 
     before = log.read_bytes()
     assert run("log", "annotate", str(log), "mud=A", "note=a\nb").returncode == 2
     assert run("log", "annotate", str(log), "Mud=A").returncode == 2 and log.read_bytes() == before
+    assert run("log", "annotate", str(log), "mud=A").stdout.startswith("mud ")
     assert run("log", "annotate", str(log), "mud=A", "--json").returncode == 0
     living.finish()
     assert annotate(living.path, {"mud": "A"}) == {"mud": "A"}
