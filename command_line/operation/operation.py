@@ -67,12 +67,12 @@ def walk(
     adaptive: Adaptive = False,
     gait: Annotated[str, Option("walk the gait of this file, or of one that ships", metavar="FILE")] = "",
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
-    mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
+    mud: Annotated[str | None, Option("name of the mud, for the log", metavar="NAME")] = None,
     water: Water = None,
-    trial: Annotated[str, Option("number or name of the trial", metavar="NAME")] = "",
-    operator: Annotated[str, Option("who operates the robot", metavar="NAME")] = "",
+    trial: Annotated[str | None, Option("number or name of the trial", metavar="NAME")] = None,
+    operator: Annotated[str | None, Option("who operates the robot", metavar="NAME")] = None,
     tag: Annotated[tuple[str, ...], Option("word that finds this walk again", metavar="WORD")] = (),
-    note: Annotated[str, Option("what to know about this walk", metavar="TEXT")] = "",
+    note: Annotated[str | None, Option("what to know about this walk", metavar="TEXT")] = None,
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> Answer:
@@ -82,14 +82,15 @@ def walk(
 
     A gait of a file has its own depths, unless `depth` is given. 'mudskipper gait check FILE' needs no robot.
 
-    A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
+    A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults, and `--mud ""` or
+    another empty text leaves one out.
     """
     if len(depth) > LONGEST_ARRAY:
         raise usage_error(f"--depth is given {len(depth)} times; at most {LONGEST_ARRAY} depths take turns")
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
-    described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
-    described["water"] = "" if water is None else f"{water:g}"
-    params |= {key: value for key, value in described.items() if value}
+    described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag) if tag else None, "note": note}
+    described["water"] = None if water is None else f"{water:g}"
+    params |= {key: value for key, value in described.items() if value is not None}
     if gait:
         from firmware_host.configuration.gait_file import as_json, gait_document  # slow to import
 
@@ -190,15 +191,16 @@ def _change_mode(command: str, mode: str, socket: Socket, params: dict[str, Any]
 
 
 def _call_patiently(client: StatusClient, command: str, params: dict[str, Any], waiting_s: float) -> None:
-    """Call until it is accepted. Raises CallRefusedError after `waiting_s`, and at once in modes but boot and idle."""
+    """Call until it is accepted. Raises CallRefusedError after `waiting_s`, and at once where no wait would help."""
     deadline_s, reported = time.monotonic() + waiting_s, False
     while True:
         try:
             client.call(command, **params)
             return
         except CallRefusedError as problem:
+            is_wrong = any(str(problem).startswith(f"{name} = ") for name in params)
             waits = time.monotonic() < deadline_s and client.call("status")["mode"] in ("boot", "idle")
-            if not waits:
+            if is_wrong or not waits:
                 raise
             complain(*[f"{problem} Waiting for that to end; Ctrl-C gives up"] * (not reported))
             reported = True

@@ -185,3 +185,10 @@ def test_only_what_ends_by_itself_is_waited_for(
     )
     ended = run("arm", *filter(None, [option]))
     assert ended.returncode == status and ended.stderr.count("left_sweep joint moves") == 1
+
+
+def test_a_wrong_value_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusals = iter([CallRefusedError("force = 'TYPO': must be one of joint_position")])
+    answer_with(monkeypatch, lambda method: next(refusals) if method == "arm" else {"mode": "idle", "notice": ""})
+    ended = run("arm", "--wait", "--force", "TYPO")
+    assert ended.returncode == exit_codes.REFUSED and ended.stderr.startswith("mudskipper: force = 'TYPO'")

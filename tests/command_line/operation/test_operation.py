@@ -89,6 +89,8 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
     assert Mode.WALKING in read_log(first).ticks["mode"]
     bench.reset()
     assert bench.run("arm").stdout == "hold\n"
+    bench.run("walk", "--mud", "")
+    assert json.loads(bench.run("trial", "--json").stdout)["present"] == {"plate": "flat"}
 
 
 def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_bench: Bench) -> None:
