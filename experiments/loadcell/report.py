@@ -1,7 +1,6 @@
 """Evaluates the recorded trials of a load cell: coefficients of each mud with their errors, tables and figures."""
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import hypot, isfinite
@@ -27,7 +26,7 @@ from experiments.loadcell.recording import load_counted
 from experiments.loadcell.stage import TrialPlan
 from experiments.loadcell.stage_track import common_alignment
 from experiments.loadcell.strokes import INSERTION, RATE_EXPONENT, AnalysedTrial, StageSettings
-from experiments.reports.mud_names import mud_key, mud_text
+from experiments.reports.mud_names import file_part, mud_key, mud_text
 from experiments.reports.value_text import coefficient_text, miss_text, repeatability_text, value_text
 from experiments.study.notebook import Notebook
 from experiments.study.option import OptionError
@@ -116,7 +115,7 @@ def make_result(
         rows = DataFrame([_trial_row(trial) for trial in own])
         rows = rows.loc[:, ~rows.isin(["", "-"]).all()]
         tables.append(Table(f"trials {mud}", "", UNITS, rows, section, on_page_only=True))
-        name, draw = re.sub(r"[^\w.]+", "_", f"mud_{mud}"), partial(draw_mud, own, coefficients, plan.settings)
+        name, draw = f"mud_{file_part(mud)}", partial(draw_mud, own, coefficients, plan.settings)
         figures.append(Figure(name, f"{section}: {FITTED}", draw, section))
     return Result(
         tables=tables,

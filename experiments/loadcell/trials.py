@@ -4,7 +4,6 @@ Samples are on the disk before they are evaluated, and the files of a repeated t
 file that counts. The same command continues an interrupted experiment.
 """
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
@@ -27,6 +26,7 @@ from experiments.loadcell.recording import (
 )
 from experiments.loadcell.stage import CellTrial
 from experiments.loadcell.strokes import INSERTION, AnalysedTrial, Mask
+from experiments.reports.mud_names import file_part
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry
 from experiments.study.prompt import GO_ON, REDO, SKIP
@@ -123,8 +123,7 @@ def record(bench: CellBench, trial: CellTrial, attempt: int) -> tuple[Entry, lis
 
 def _unused_name(folder: Path, trial: CellTrial) -> str:
     """Return a name for the files of a trial, without their ending: those of earlier recordings stay."""
-    plain_key = re.sub(r"[^\w.]+", "_", trial.key)
-    names = (f"{RAW}/{plain_key}_{number}" for number in count(1))
+    names = (f"{RAW}/{file_part(trial.key)}_{number}" for number in count(1))
     return next(name for name in names if not (folder / f"{name}.csv").exists())
 
 

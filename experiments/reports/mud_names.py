@@ -17,6 +17,11 @@ def mud_key(name: str) -> str:
     return f"{float(water[1]):g}" if water else name.strip().casefold()
 
 
+def file_part(name: str) -> str:
+    """Return a name as a part of a file's name."""
+    return re.sub(r"[^\w.]+", "_", name)
+
+
 def mud_label(name: str) -> str:
     """Format for a table's head or an axis."""
     water = WATER.fullmatch(name)

@@ -20,6 +20,7 @@ from experiments.loadcell.report import evaluate_muds, load_flipper, make_result
 from experiments.loadcell.stage import TrialPlan, clay_truth, water_of
 from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import measure_all
+from experiments.reports.mud_names import file_part
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Notebook
 from experiments.study.option import Option, OptionError
@@ -112,8 +113,8 @@ def _check_names(port: str | None, format_name: str, unit: str, muds: tuple[str,
         raise OptionError("name the serial port of the load cell with --port, or use --simulated or --practise")
     if unit and unit.lower() not in UNITS:
         raise OptionError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
-    if len({mud.lower() for mud in muds}) < len(muds):
-        raise OptionError("two muds have the same name")
+    if len({file_part(mud).lower() for mud in muds}) < len(muds):
+        raise OptionError("two muds have the same name, or differ only in signs and capitals, as no files should")
     try:
         if format_name != AUTO:
             LineFormat(format_name)

@@ -108,6 +108,7 @@ WRONG_COMMAND_LINES = [  # and what the message names
             ("--mud clay", "water content"),
             ("--mud 70", "44 to 56"),
             ("--mud 50 --mud 50", "same name"),
+            ("--mud a@b --mud A_b", "signs and capitals"),
             ("--depth 4", "plate's height"),
             ("--format words", "column1 to column9"),
             ("--unit stone", "must be one of"),
