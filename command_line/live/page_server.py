@@ -231,7 +231,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _text(self) -> str:
         """Return the text that was sent; one that the daemon would refuse as too long is cut off."""
         length = self.headers.get("Content-Length", "")
-        text = self.rfile.read(min(int(length), LONGEST_TEXT) if length.isdecimal() else 0)
+        text = self.rfile.read(min(int(length[:9]), LONGEST_TEXT) if length.isdecimal() else 0)
         return text[:LONGEST_REQUEST].decode(errors="replace")
 
     def _refusal(self) -> str | None:

@@ -157,6 +157,14 @@ def test_the_body_of_another_site_s_request_is_no_request(page: PageServer, leng
     assert answer.count(b"HTTP/1.1") == 1 and f"HTTP/1.1 {REFUSED}".encode() in answer
 
 
+def test_a_length_that_is_no_number_of_python_s_is_answered(page: PageServer) -> None:
+    head = f"POST /note HTTP/1.1\r\nHost: {ADDRESS}:{page.port}\r\nX-Mudskipper: stop\r\n"
+    with socket.create_connection((ADDRESS, page.port), timeout=60) as connection:
+        connection.sendall(f"{head}Content-Length: {5000 * '9'}\r\n\r\nit rains".encode())
+        connection.shutdown(socket.SHUT_WR)
+        assert b"note: no daemon answers" in connection.makefile("rb").read()
+
+
 @pytest.mark.parametrize("headers", [{}, {"X_Mudskipper": "go"}], ids=str)
 def test_a_stop_without_the_page_s_header_is_refused(page: PageServer, headers: dict[str, str]) -> None:
     status, text = post(page, **headers)
