@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from glob import escape
 from pathlib import Path
 from typing import Annotated
@@ -48,6 +49,8 @@ def pull(
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
         compared = _compare(source, into, logs)
     except (CommandError, KeyboardInterrupt) as problem:
+        with suppress(OSError):
+            into.rmdir()  # which is refused unless nothing was copied
         copied = counted(len(log_files(into, DONE, PRESERVED)) - len(before), "new log")
         status = exit_codes.UNHEALTHY if isinstance(problem, CommandError) else exit_codes.INTERRUPTED
         raise CommandError(

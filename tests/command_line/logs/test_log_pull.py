@@ -111,3 +111,4 @@ def test_without_rsync_or_a_robot_it_says_what_to_do(robot: Path, monkeypatch: p
     assert "'none:'" in run("log", "pull", "none").stderr
     monkeypatch.setenv("PATH", "/none")
     assert "apt install rsync" in run("log", "pull", "host:").stderr
+    assert not Path("robot-logs").exists()
