@@ -29,7 +29,7 @@ from control.bounds import Bounds
 from control.computing.suggestion import similar_name
 from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 
-LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
+LARGEST_FILE_BYTES = 100_000  # ten times those of a robot or a world; the rows' socket sends it in one packet
 
 
 @dataclass(frozen=True)

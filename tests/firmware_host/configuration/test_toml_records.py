@@ -133,5 +133,5 @@ def test_a_file_beyond_all_size_is_refused_unread(tmp_path: Path) -> None:
     path.write_bytes(b"#" * LARGEST_FILE_BYTES)
     assert len(read_text(path)) == LARGEST_FILE_BYTES
     path.write_bytes(b"#" * (LARGEST_FILE_BYTES + 1))
-    with pytest.raises(ConfigurationError, match="must have at most 1000000 bytes"):
+    with pytest.raises(ConfigurationError, match="must have at most 100000 bytes"):
         read_text(path)

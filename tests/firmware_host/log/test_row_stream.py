@@ -5,10 +5,12 @@ import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from firmware_host.configuration.toml_records import LARGEST_FILE_BYTES
 from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 from firmware_host.sockets.rights import Group, Peer, Rights
@@ -60,6 +62,12 @@ def test_every_subscriber_gets_every_row_with_its_values(stream: RowStream, path
         assert [row.kind.topic for row in rows] == ["/tick", "/event", "/tick"]
         assert rows[1].values == {"stamp_s": 0.2, "text": "walk"}
         assert subscriber.metadata == {"robot": "test"}
+
+
+def test_a_subscriber_gets_the_rows_of_a_robot_with_the_largest_file(path: Path) -> None:
+    text = "é" * (LARGEST_FILE_BYTES // 2)
+    with closing(RowStream(path, OWN, {}, text)) as stream, closing(subscribe(stream, path)) as rows:
+        assert rows.configuration_text == text
 
 
 def test_a_subscriber_that_hangs_loses_its_own_rows_and_learns_how_many(stream: RowStream, path: Path) -> None:
