@@ -33,6 +33,7 @@ from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
 from simulation.harness.local_setup import named_folder
+from simulation.harness.peer import end_with_parent
 
 STARTING_S, ENDING_S, POLL_S = 10.0, 20.0, 0.1
 FILE = "mudskipper.toml"  # of the daemon that holds the weights
@@ -80,8 +81,8 @@ def running_daemon(configuration: Configuration, folder: Path) -> Iterator[Path]
     path, messages = folder / FILE, folder / "mudskipperd.txt"
     path.write_text(changed_text(configuration.text, paths), encoding="utf-8")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
-    with messages.open("wb") as output:  # Ctrl-C is for this program: the daemon's weight is taken off first
-        daemon = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+    with messages.open("wb") as log:  # Ctrl-C is for this program: the daemon's weight is taken off first
+        daemon = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True, preexec_fn=end_with_parent)  # noqa: PLW1509
     try:
         _wait_for(daemon, socket, messages)
         yield socket

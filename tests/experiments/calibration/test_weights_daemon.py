@@ -1,6 +1,8 @@
 """The weighing of a real robot has a daemon of its own, in real time."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ from firmware_host.configuration.loading import parse_configuration
 from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
 from tests.running_bench import Bench
+from tests.waiting import wait_until
 
 
 def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Path) -> None:
@@ -20,6 +23,25 @@ def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Pa
     assert not socket.exists()
     own_bench.restart_daemon()
     own_bench.wait_until_ready()
+
+
+def test_the_daemon_of_the_weights_ends_where_the_program_is_killed(short_folder: Path, tmp_path: Path) -> None:
+    path = write_local_setup(short_folder, tmp_path)
+    program = f"""
+from pathlib import Path
+from signal import pause
+from experiments.calibration.robots import running_daemon
+from firmware_host.configuration.loading import load_configuration
+with running_daemon(load_configuration(Path({str(path)!r})), Path({str(short_folder)!r})) as socket:
+    print(socket, flush=True)
+    pause()
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as killed:
+        assert killed.stdout
+        socket = Path(killed.stdout.readline().strip())
+        assert socket.exists()
+        killed.kill()
+    wait_until(lambda: not socket.exists())
 
 
 def test_two_robots_of_one_user_have_a_daemon_each(
