@@ -36,6 +36,7 @@ REPORT_BYTES = 256  # left free for the report of a loss, which is sent together
 LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
 REPORT_CALLS = 95  # calls of `report` between two reads of its pipe: four reads a second at 380 Hz
+BLOCKED = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGABRT}  # by the writer
 REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
 
 
@@ -237,8 +238,8 @@ class Recorder:
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
-    """Start the writer with blocked signals: Ctrl-C, the service's stop and its watchdog reach it too."""
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
+    """Start the writer with blocked signals: those of Ctrl-C, a closed terminal and the service reach it too."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED)
     try:
         command = [sys.executable, "-P", "-m", "firmware_host.log.writer", str(path)]
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)

@@ -157,7 +157,7 @@ def test_close_ends_though_the_writer_hangs_and_reports_the_last_loss(recorder: 
 
 
 def test_signals_do_not_cut_the_log(recorder: Recorder) -> None:
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGABRT)
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGABRT)
     for number in signals:
         os.kill(recorder.writer_pid, number)  # while it is still starting
     recorder.put(TICK_KIND, make_tick(1.0))
