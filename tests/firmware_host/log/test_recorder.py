@@ -118,6 +118,15 @@ def test_rows_come_back_bit_for_bit(golden: tuple[Path, list[Row]]) -> None:
     assert [message.sequence for _, _, message in rows] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
 
 
+def test_a_row_has_the_wall_clock_of_its_stamp(golden: tuple[Path, list[Row]]) -> None:
+    """Other programs order and align a log by it."""
+    offset_ns = int(read_log(golden[0]).metadata["wall_minus_monotonic_ns"])
+    assert abs(offset_ns - (time.time_ns() - time.monotonic_ns())) < 1e9
+    with golden[0].open("rb") as file:
+        times_ns = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
+    assert times_ns == [offset_ns + round(1e9 * row.values[0]) for row in golden[1]]
+
+
 def test_rosbags_decodes_the_same_values(golden: tuple[Path, list[Row]]) -> None:
     with AnyReader([golden[0]]) as bag:
         for kind in ROW_KINDS:

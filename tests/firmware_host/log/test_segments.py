@@ -22,6 +22,7 @@ from firmware_host.log.segments import LogSegments
 from firmware_host.trial import BEGUN, SET, OperatorReport, from_json, load_defaults, to_json
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_log, read_logs
+from logs.files.log_summary import operator_reports
 from logs.files.stored_logs import run_files
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 
@@ -91,6 +92,9 @@ def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_re
         ("run-0005_B", last),
         ("run-0006", {}),
     ]
+    events = [read_log(path).events for path in log_files(tmp_path, DONE)]
+    begun = [[report.text for _, report in operator_reports(each)] for each in events]
+    assert begun == [[], [to_json(named)], [], [to_json(letters)], [to_json(nothing)], [to_json(last)], []]
     assert run_files(tmp_path / DONE / "run-0003.mcap") == log_files(tmp_path, DONE)
     assert read_logs(log_files(tmp_path, DONE)).metadata.get("trial") is None
     assert read_logs(log_files(tmp_path, DONE)[1:3]).metadata["trial"] == to_json(named)
@@ -197,6 +201,24 @@ def test_a_power_cut_costs_a_second_and_what_the_disk_needs(
     left = tmp_path / "left.mcap"
     left.write_bytes(log.path.read_bytes()[: lengths[-1]])
     assert read_log(left).ticks["stamp_s"][-1] == log.durable_stamp_s
+
+
+def test_a_log_is_whole_on_the_disk_before_it_is_in_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synchronised, moved, rename = {}, [], Path.rename
+
+    def synchronise(descriptor: int) -> None:
+        status = os.fstat(descriptor)
+        synchronised[status.st_ino] = status.st_size
+
+    def move(path: Path, target: Path) -> Path:
+        moved.append(synchronised[path.stat().st_ino] == path.stat().st_size)
+        return rename(path, target)
+
+    monkeypatch.setattr(os, "fsync", synchronise)
+    monkeypatch.setattr(Path, "rename", move)
+    log = make_segments(tmp_path, ONE_FILE)
+    write_ticks(log, 0, 100)
+    assert log.close() and moved == [True]
 
 
 @pytest.mark.usefixtures("at_once")
