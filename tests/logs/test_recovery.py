@@ -53,6 +53,26 @@ def test_every_row_comes_back_and_the_file_moves_to_done(tmp_path: Path) -> None
     assert log.events[-1]["text"].startswith("recovered: 500 rows; ")
 
 
+def test_a_recovered_log_is_durable_before_the_damaged_one_goes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, steps, fsync, unlink = make_cut_log(tmp_path), [], os.fsync, Path.unlink
+
+    def synchronise(descriptor: int) -> None:
+        steps.append(Path(f"/proc/self/fd/{descriptor}").readlink())
+        fsync(descriptor)
+
+    def remove(path: Path, **options: bool) -> None:
+        steps.append(path)
+        unlink(path, **options)
+
+    monkeypatch.setattr(os, "fsync", synchronise)
+    monkeypatch.setattr(Path, "unlink", remove)
+    recover_log(path)
+    assert set(steps[-3:-1]) == {tmp_path / ACTIVE, tmp_path / DONE}
+    assert steps[-1] == path.with_name(path.name + ".broken")
+
+
 def test_readers_of_other_projects_open_a_recovered_log(tmp_path: Path) -> None:
     path = recover_log(make_cut_log(tmp_path)).path
     with AnyReader([path]) as bag:

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from shutil import disk_usage
 
 import pytest
 
@@ -78,9 +79,9 @@ def test_a_log_that_cannot_be_deleted_does_not_keep_the_quota_from_others(tmp_pa
 
 
 def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
-    assert free_space(tmp_path / "none" / "yet").free_fraction == pytest.approx(
-        free_space(tmp_path).free_fraction, abs=0.05
-    )
+    found, disk = free_space(tmp_path / "none" / "yet"), disk_usage(tmp_path)
+    assert found.free_fraction == pytest.approx(free_space(tmp_path).free_fraction, abs=0.05)
+    assert found.free_bytes == pytest.approx(disk.free, abs=0.05 * disk.total)
 
 
 def test_every_file_in_active_counts_as_a_log(tmp_path: Path) -> None:

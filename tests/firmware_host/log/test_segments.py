@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -100,6 +101,22 @@ def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_re
     assert read_logs(log_files(tmp_path, DONE)[1:3]).metadata["trial"] == to_json(named)
 
 
+def test_the_last_seconds_of_a_rest_are_complete(tmp_path: Path) -> None:
+    log = make_segments(tmp_path, replace(ONE_FILE, rest_hz=10.0, rest_full_s=0.5))
+    log.write(make_ticks(0, 1000, Mode.IDLE))
+    assert log.close()
+    assert read_log(tmp_path / DONE / "run-0000.mcap").ticks["tick"][-190:].tolist() == list(range(810, 1000))
+
+
+def test_a_finished_log_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / DONE).mkdir()
+    (tmp_path / DONE / "run-0000.mcap").write_text("precious")
+    log = make_segments(tmp_path, ONE_FILE)
+    log.write(make_ticks(0, 10))
+    assert log.close() and log.path.name == "run-0001.mcap"
+    assert (tmp_path / DONE / "run-0000.mcap").read_text() == "precious"
+
+
 def test_the_defaults_of_trials_are_stored_and_damaged_ones_are_no_defaults(tmp_path: Path) -> None:
     log = make_segments(tmp_path)
     log.write([make_report(SET, {"mud": "A"}), make_report(SET, {"mud": "B", "plate": "flat"})])
@@ -148,6 +165,10 @@ def full(descriptor: int, piece: bytes) -> int:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
+def broken(descriptor: int, piece: bytes) -> int:
+    raise OSError(errno.EIO, "Input/output error")
+
+
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the writer flush, synchronise and try again at every call."""
@@ -157,9 +178,13 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("at_once")
-@pytest.mark.parametrize(("quota_bytes", "deleted"), [(0, 0), (10**9, 1)])
+@pytest.mark.parametrize(("write", "quota_bytes", "deleted"), [(full, 0, 0), (full, 10**9, 1), (broken, 10**9, 0)])
 def test_a_full_disk_frees_nothing_where_nothing_may_be_freed_and_stops_where_it_does_not_help(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quota_bytes: int, deleted: int
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    write: Callable[[int, bytes], int],
+    quota_bytes: int,
+    deleted: int,
 ) -> None:
     """Another program uses the freed space, or a second link keeps the deleted file."""
     old = make_old_logs(tmp_path, 5)
@@ -167,7 +192,7 @@ def test_a_full_disk_frees_nothing_where_nothing_may_be_freed_and_stops_where_it
     log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=quota_bytes))
     monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
     with monkeypatch.context() as patch:
-        patch.setattr(os, "write", full)
+        patch.setattr(os, "write", write)
         for number in range(5):
             log.write(make_ticks(100 * number, 100 * number + 190))
     assert log.problem and [path.exists() for path in old] == [False] * deleted + [True] * (5 - deleted)
@@ -290,8 +315,10 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
     monkeypatch.setattr(os, "write", write)
     log.write(make_ticks(200, 210))
     assert (log.problem, old.exists(), newest.exists()) == ("", False, True)
+    log.write([make_report(BEGUN, {})])
     assert log.close()
     capsys.readouterr()
+    assert len(read_log(tmp_path / DONE / "run-0002.mcap").events) == 1  # which misses nothing
     ours = read_log(tmp_path / DONE / "run-0001.mcap")
     assert ours.ticks["tick"].tolist() == list(range(200, 210))
     assert [event["text"] for event in ours.events] == [
