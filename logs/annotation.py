@@ -75,10 +75,20 @@ def _append(path: Path, file: BinaryIO, summary: Summary, record: Metadata) -> N
     footer = FOOTER.pack(Opcode.FOOTER, FOOTER.size - 9, start, 0, 0)[:-4]
     Footer(start, 0, zlib.crc32(footer, zlib.crc32(index))).write(tail)
     tail.write(MCAP0_MAGIC)
-    file.seek(end)
-    file.write(tail.end())  # type: ignore[no-untyped-call]
-    file.flush()
-    os.fsync(file.fileno())
+    _replace_end(file.fileno(), end, tail.end())  # type: ignore[no-untyped-call]
+
+
+def _replace_end(descriptor: int, start: int, end: bytes) -> None:
+    """Write all of a longer end, or leave the present one: the disk may be full. Raises OSError."""
+    present, unwritten = os.pread(descriptor, len(end), start), memoryview(end)
+    try:
+        while unwritten:
+            unwritten = unwritten[os.pwrite(descriptor, unwritten, start + len(end) - len(unwritten)) :]
+        os.fsync(descriptor)
+    except OSError:
+        os.pwrite(descriptor, present, start)
+        os.ftruncate(descriptor, start + len(present))
+        raise
 
 
 def _index_of(summary: Summary) -> bytes:

@@ -1,5 +1,6 @@
 """A closed log takes a description without a change of its rows, and everything that reads logs knows it."""
 
+import resource
 import shutil
 from pathlib import Path
 
@@ -66,6 +67,18 @@ def test_a_power_cut_in_the_middle_costs_no_row(log: Path, step: int) -> None:
     recover_log(log)
     before, after = scan_log(WALK), scan_log(log)
     assert after.complete and (after.rows, len(after.strides)) == (before.rows, len(before.strides))
+
+
+def test_a_full_disk_leaves_the_log_as_it_was(log: Path) -> None:
+    """The kernel limits the size of files for a while."""
+    before, unlimited = log.read_bytes(), resource.RLIM_INFINITY
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, unlimited))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            annotate(log, TRIAL)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (unlimited, unlimited))
+    assert log.read_bytes() == before
 
 
 def test_a_log_that_is_recovered_keeps_its_description(log: Path) -> None:
