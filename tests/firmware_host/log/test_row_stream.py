@@ -83,6 +83,8 @@ def test_a_subscriber_that_hangs_loses_its_own_rows_and_learns_how_many(stream: 
     late += received(hanging)
     assert late[-1] == 3000 and hanging.lost > 0
     assert len(late) + hanging.lost == 3001
+    stream.publish([tick(3001)])
+    assert received(hanging) == [3001] and len(late) + hanging.lost == 3001  # each loss is sent once
 
 
 def test_a_subscriber_that_leaves_costs_the_others_nothing(stream: RowStream, path: Path) -> None:
