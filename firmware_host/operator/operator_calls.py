@@ -305,9 +305,7 @@ class OperatorCalls:
         def call(params: dict[str, Any], caller: Caller) -> str:
             _accepted(self._lease.refusal(caller, self._clock(), params["take_over"]))
             answer: str = method(params, caller)
-            if self._lease.held and self._lease.holder != caller:
-                self._loop.events.report(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
-                self._lease.oust(caller)
+            self._oust(caller)
             if params["lease_s"] is not None:
                 self._renew_lease(caller, params["lease_s"])
             return answer
@@ -320,8 +318,14 @@ class OperatorCalls:
     def stop(self, params: dict[str, Any], caller: Caller) -> str:
         """End a walk or a move; in hold another program that holds the lease loses it, or it might move on at once."""
         if self._loop.mode is Mode.HOLD:
-            self._lease.oust(caller)
+            self._oust(caller)
         return self._request(caller, Request.STOP)
+
+    def _oust(self, caller: Caller) -> None:
+        """End the lease of another program, if one holds it."""
+        if self._lease.held and self._lease.holder != caller:
+            self._loop.events.report(self._clock(), f"lease of {self._lease.holder} taken over by {caller}")
+            self._lease.oust(caller)
 
     def clear(self, params: dict[str, Any], caller: Caller) -> str:
         """Clear faults; with `zero`, also accept the angles of joints whose zero may have shifted."""

@@ -332,6 +332,7 @@ def test_a_stop_of_another_user_ends_the_moves_of_a_program_that_sends_them_at_a
     armed.ask("stop", BEN)
     with pytest.raises(RefusedError, match=r"^taken over: uid 1001 \(process 78\)"):
         armed.ask("move", left_sweep_rad=0.3, lease_s=1.0)
+    assert armed.events.about("lease of") == ["lease of uid 1000 (process 77) taken over by uid 1001 (process 78)"]
     armed.steps.run_for(1.2)
     assert (armed.ask("status")["mode"], armed.ask("status")["moving"]) == ("hold", False)
 
