@@ -28,6 +28,7 @@ from firmware_host.log.log_folder import (
     finished_path,
     free_space,
     segment_path,
+    synchronise_folder,
     unfinished_files,
 )
 from firmware_host.log.rest_thinning import RestThinning
@@ -95,6 +96,7 @@ class LogSegments:
         elif report.kind == SET and self._folder is not None:
             with suppress(OSError):  # they hold until the daemon ends
                 store_defaults(self._folder, report.text)
+                synchronise_folder(self._folder)
 
     def _write_rows(self, rows: Rows) -> None:
         for number, row in rows[-1:]:

@@ -117,9 +117,13 @@ def test_a_finished_log_is_not_written_over(tmp_path: Path) -> None:
     assert (tmp_path / DONE / "run-0000.mcap").read_text() == "precious"
 
 
-def test_the_defaults_of_trials_are_stored_and_damaged_ones_are_no_defaults(tmp_path: Path) -> None:
-    log = make_segments(tmp_path)
+def test_the_defaults_of_trials_are_stored_and_damaged_ones_are_no_defaults(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, durable = make_segments(tmp_path), list[Path]()
+    monkeypatch.setattr(os, "fsync", lambda number: durable.append(Path(f"/proc/self/fd/{number}").readlink()))
     log.write([make_report(SET, {"mud": "A"}), make_report(SET, {"mud": "B", "plate": "flat"})])
+    assert durable == [tmp_path / ".trial.json", tmp_path] * 2  # the contents, then the name
     assert load_defaults(tmp_path) == {"mud": "B", "plate": "flat"}
     for text in ("", "[1]", '{"mud": 1}', '{"Mud": "A"}', "\0", '{"mud": "a\\nb"}'):
         (tmp_path / "trial.json").write_text(text)
