@@ -33,12 +33,13 @@ def log(tmp_path: Path) -> Path:
 def test_keys_are_added_replaced_and_removed_and_no_row_changes(log: Path) -> None:
     assert annotate(log, TRIAL | {"note": "?"}) == TRIAL | {"note": "?"}
     assert annotate(log, {"note": "", "operator": "Anna"}) == TRIAL | {"operator": "Anna"}
+    assert annotate(log, {"operator": "Ben"}) == TRIAL | {"operator": "Ben"}
     before, after = WALK.read_bytes(), log.read_bytes()
     with WALK.open("rb") as old, log.open("rb") as new:
         readers = [make_reader(old, validate_crcs=True), make_reader(new, validate_crcs=True)]
         rows = [[(row[2].log_time, row[2].data) for row in reader.iter_messages()] for reader in readers]
         summary = readers[1].get_summary()
-        assert summary and summary.statistics and summary.statistics.metadata_count == 3
+        assert summary and summary.statistics and summary.statistics.metadata_count == 4
         chunks = summary.chunk_indexes[-1]
     data_end = chunks.chunk_start_offset + chunks.chunk_length
     assert rows[0] == rows[1] and before[:data_end] == after[:data_end]

@@ -96,6 +96,18 @@ def test_damage_in_the_middle_costs_what_it_touches(tmp_path: Path) -> None:
     assert log.metadata["rows_lost"] == str(CHUNK)
 
 
+def test_rows_of_a_log_without_its_metadata_have_the_wall_clock_that_they_had(tmp_path: Path) -> None:
+    cut = make_file(tmp_path / "run.mcap", chunks=0)
+    cut.write(make_ticks(380, 380 + CHUNK))
+    cut.flush()
+    cut._file.close()
+    path = cut.path
+    path.write_bytes(path.read_bytes().replace(b"\x0a\x00\x00\x00mudskipper", b"\x0a\x00\x00\x00mudskippeR"))
+    log = read_log(recover_log(path).path)
+    assert "run_id" not in log.metadata and len(log.ticks) == CHUNK
+    assert log.metadata["wall_minus_monotonic_ns"] == str(OPENING["wall_minus_monotonic_ns"])
+
+
 def test_a_log_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
     log = make_file(tmp_path / ACTIVE / "run-0000.mcap")
     with pytest.raises(BlockingIOError):

@@ -1,16 +1,19 @@
 """The methods of the socket: the log names each sender, and the lease decides who may move the robot."""
 
+import re
 from itertools import pairwise
 from math import nan, radians
 from typing import Any
 
 import pytest
 
+from control.faults import FaultKind
 from control.modes import Mode
 from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import LONGEST_TEXT
+from firmware_host.loop import Loop
 from firmware_host.mud_learning import ClosedStride
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
@@ -159,6 +162,7 @@ def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None
         ("trial_set", {"water": "nan"}, "water"),
         ("trial_set", {name: "ü" * 900 for name in ("mud", "note")}, "3000"),
         ("walk", {"water": "101"}, "water"),
+        ("walk", {"water": "-1"}, "water"),
     ],
 )  # fmt: skip
 def test_a_description_that_cannot_be_logged_is_refused_with_its_key(
@@ -354,6 +358,13 @@ def test_moves_at_a_rate_go_on_without_jumps_and_are_logged_once_a_second(armed:
 def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed: Robot) -> None:
     armed.steps.loop.controller.cut_short = True
     with pytest.raises(RefusedError, match="'mudskipper stop' raises them first"):
+        armed.ask("move", left_sweep_rad=0.3)
+
+
+def test_a_move_that_a_present_fault_would_end_is_refused(armed: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    fault = FaultKind.CURRENT_STALE.fault("left_sweep")
+    monkeypatch.setattr(Loop, "fault", fault)
+    with pytest.raises(RefusedError, match=re.escape(fault.message)):
         armed.ask("move", left_sweep_rad=0.3)
 
 
