@@ -5,6 +5,9 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet
 
+# Without stored bytecode, each of the hundreds of processes of the tests compiles its libraries again, which takes it 2 s.
+unexport PYTHONDONTWRITEBYTECODE
+
 # These tests run a robot in real time, which takes a part of a processor: nothing else runs next to two of them.
 REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/live/test_restarts.py experiments/calibration/test_weights_daemon.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py)
 
