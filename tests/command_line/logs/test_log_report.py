@@ -24,6 +24,8 @@ from tests.command_line.command_lines import failure, run
 from tests.folders import SHARED_DATA
 from tests.recorded_walks import record_walks
 
+pytestmark = pytest.mark.usefixtures("png_alone")
+
 UPTIME_S = 36384.0
 LAB_LOGS = SHARED_DATA / "flipper_in_mud"
 
@@ -42,12 +44,7 @@ def test_the_page_shows_every_walk_stride_and_event(
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert [each["joint"] for each in report["supply"]] == [*JOINTS] and "lowest supply (V)" in page
     assert page.count("data:image/png") == 5  # two of each of the two walks, and the fits
-    for name in ("walk-1", "walk-2", "strides-1", "strides-2", "fits"):
-        starts = {ending: (folder / f"{name}{ending}").read_bytes()[:5] for ending in (".png", ".svg", ".pdf")}
-        assert starts == {".png": b"\x89PNG\r", ".svg": b"<?xml", ".pdf": b"%PDF-"}
-        assert f"{name}.svg and {name}.pdf" in page
-    pdf = (folder / "fits.pdf").read_bytes()
-    assert b"/Type3" not in pdf  # journals refuse such fonts
+    assert {path.stem for path in folder.glob("*.png")} == {"walk-1", "walk-2", "strides-1", "strides-2", "fits"}
     assert (folder / "two.mcap").read_bytes() == two_walks.read_bytes()
 
 
@@ -116,7 +113,7 @@ def test_a_log_that_is_cut_off_before_its_first_stride_ends_is_named_in_headline
     ended = run("log", "report", str(path), "--out", str(tmp_path / "page"), "--json")
     report = json.loads(ended.stdout)
     assert ended.returncode == exit_codes.UNHEALTHY and report["headline"]["complete"] is False
-    assert report["strides"] == [] and (tmp_path / "page" / "walk-1.svg").exists()
+    assert report["strides"] == [] and (tmp_path / "page" / "walk-1.png").exists()
     assert ended.stderr.startswith("cut ends early: ")
 
 
@@ -157,8 +154,7 @@ def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png") == 1 and page.count("<table>") == 2
     names = {path.name for path in out.iterdir()}
-    pictures = {f"comparison{ending}" for ending in (".png", ".svg", ".pdf")}
-    assert names == {"report.html", "summary.json", "two.mcap", "another.mcap", *pictures}
+    assert names == {"report.html", "summary.json", "two.mcap", "another.mcap", "comparison.png"}
 
 
 # bad input gives one sentence each

@@ -33,8 +33,11 @@ def test_the_page_contains_its_pictures_and_shows_text_as_it_is(tmp_path: Path) 
     written = write_result(tmp_path, result, {"k": 1}, rows, lambda what, done, total: shown.append((done, total)))
     names = ["report.html", "summary.json", "results.parquet", "line.png", "line.svg", "line.pdf", "a.mcap"]
     assert [path.name for path in written] == names and shown == [(0, 1)]
+    assert [path.read_bytes()[:5] for path in written[3:6]] == [b"\x89PNG\r", b"<?xml", b"%PDF-"]
+    assert b"/Type3" not in written[5].read_bytes()  # journals refuse such fonts
     page = written[0].read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page) and page.count("data:image/png") == 1
+    assert "line.svg and line.pdf" in page
     for text in ("A &lt; B", "48.5 &lt;b&gt;", "Force &amp; such", "k_p (N/cm³)", ">-</td>", "Left out: 1."):
         assert text in page
     assert RESULT.text().splitlines()[0] == "A < B" and RESULT.json() == {"muds": [{"mud": "48.5 <b>", "k_p": None}]}
