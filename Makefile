@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/live/test_restarts.py experiments/calibration/test_weights_daemon.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py)
 
 # Ends a test that hangs, and prints where it hangs.
-PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=1800 -o faulthandler_exit_on_timeout=true
+PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist worksteal --durations=10 -o faulthandler_timeout=1800 -o faulthandler_exit_on_timeout=true
 
 # Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
