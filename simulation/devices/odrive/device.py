@@ -66,8 +66,11 @@ class SimulatedOdrive(SimulatedDrive):
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self._settings = OdriveSettings()
         self._payloads = self._payload_functions()
-        self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._payloads}
         super().__init__(parameters, random)
+        self._number_messages()
+
+    def _number_messages(self) -> None:
+        self._ids = {message: arbitration_id(self.parameters.node_id, message) for message in self._payloads}
 
     def reset(self, now_s: float) -> None:
         super().reset(now_s)
@@ -92,6 +95,7 @@ class SimulatedOdrive(SimulatedDrive):
     def restart(self, now_s: float) -> None:
         """Restart and report the initialisation."""
         self.parameters = self._settings.restart(self.parameters)
+        self._number_messages()
         super().restart(now_s)
         self._initializing = True
 
@@ -137,6 +141,7 @@ class SimulatedOdrive(SimulatedDrive):
     def _read_parameter(self, data: bytes) -> list[Frame]:
         """Execute a message that reads or writes a setting."""
         answer, self.parameters = self._settings.execute(data, self.parameters)
+        self._number_messages()
         return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)] if answer else []
 
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:

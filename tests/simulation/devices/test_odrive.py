@@ -196,7 +196,8 @@ def test_it_answers_under_a_node_id_that_another_program_writes() -> None:
         Frame(arbitration_id(NODE, RX_SDO), RX_SDO.encode(1, ENDPOINTS["axis0.config.can.node_id"], 0) + b"\5\0\0\0"),
         0.0,
     )
-    assert answer.arbitration_id >> 5 == 5 and drive.receive(Frame(5 << 5, is_remote=True), 0.0)
+    assert answer.arbitration_id >> 5 == 5 and drive.receive(Frame(arbitration_id(5, GET_IQ), is_remote=True), 0.0)
+    assert {frame.arbitration_id >> 5 for frame in drive.cyclic_frames(1.0)} == {5}
 
 
 def reported_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:
