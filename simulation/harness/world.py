@@ -22,6 +22,7 @@ from firmware_host.configuration.toml_records import (
     shown,
 )
 from simulation.body.free_body import BodyShape
+from simulation.body.plant import STEP_S
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import FIXED_OF_DRIVE, drives_of, plant_of
@@ -158,6 +159,7 @@ def _contradictions(text: WorldText) -> Iterator[str]:
         yield from _mud_problems(key, segment)
         expected_m, where = end_m, f"where segment {number} ends"
     yield from _stone_problems(text)
+    yield from _robot_problems(text.robot)
     for source, names in DRIVE_FIELDS.items():
         disturbance = getattr(text.disturbances, source)
         for name in text.drives.keys() & set(names) if disturbance else ():
@@ -193,6 +195,16 @@ def _layer_problems(key: str, layers: list[Layer], strength_pa: float) -> Iterat
             most = f"at most {STRONGEST_PA / strength_pa:.3g} in mud of {strength_pa:.0f} Pa"
             yield f"{key}.layer {number}.factor = {factor:g}: must be {most}"
         last_m = bottom_m
+
+
+def _robot_problems(changes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a damping that would stop the body in less than a step of the integrator."""
+    mass_kg, damping_n_s_m = (
+        changes.get(name, getattr(PlantParameters, name)) for name in ("body_mass_kg", "rail_damping_n_s_m")
+    )
+    if damping_n_s_m > mass_kg / STEP_S:
+        most = f"must be at most {mass_kg / STEP_S:g} for robot.body_mass_kg = {mass_kg:g}"
+        yield f"robot.rail_damping_n_s_m = {damping_n_s_m:g}: {most}"
 
 
 def _stone_problems(text: WorldText) -> Iterator[str]:

@@ -70,6 +70,7 @@ def test_a_segment_may_be_sand_or_thixotropic() -> None:
         ("[ridge]\n", "ridge", ""),
         ("[robot]\nflipper_length_m = 0.1\n", "robot.flipper_length_m", ""),  # as the robot's configuration says
         ("[robot]\nfixed_base = true\n", "robot.fixed_base", ""),
+        ("[robot]\nbody_mass_kg = 0.5\nrail_damping_n_s_m = 501.0\n", "robot.rail_damping_n_s_m", "500"),
         ("[drives]\nnode_id = 3\n", "drives.node_id", ""),
         ("[ridges]\namplitude_m = 0.5\n", "ridges.amplitude_m", "0.01"),
         ("[random_strength]\nrelative_spread = -0.1\n", "random_strength.relative_spread", "0.0"),
