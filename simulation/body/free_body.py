@@ -193,6 +193,12 @@ class FreeBody:
             quarter.reset()
         self._drag.reset()
 
+    def put_down(self) -> None:
+        """Set the body on its belly where it is along the track: it may have overturned or sunk."""
+        forward_m = self.forward_m
+        self.reset()
+        self.forward_m = forward_m
+
     @property
     def motion(self) -> BodyMotion:
         return BodyMotion(

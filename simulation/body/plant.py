@@ -226,6 +226,12 @@ class Plant:
             arm.reset()
         self.body.reset()
 
+    def put_back(self) -> None:
+        """Set the robot down where it is as an operator does by hand, its flippers straight out on the mud."""
+        self.body.put_down()
+        for arm in self.arms:
+            arm.put_back(self.body_m)
+
     @property
     def body_m(self) -> float:
         """The body's position along the track."""

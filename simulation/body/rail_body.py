@@ -49,6 +49,8 @@ class Body(Protocol):
 
     def reset(self) -> None: ...
 
+    def put_down(self) -> None: ...
+
     @property
     def carriages(self) -> Sequence[Carriage | None]:
         """How it carries each flipper; None for a body that only moves forward."""
@@ -114,6 +116,9 @@ class RailBody:
     def reset(self) -> None:
         self.forward_m = self.forward_m_s = 0.0
         self._drag.reset()
+
+    def put_down(self) -> None:
+        """Do nothing: on its rail the body can neither overturn nor sink."""
 
     @property
     def motion(self) -> BodyMotion:

@@ -58,8 +58,7 @@ class SimulatedRobot:
         self._execute_frames()
         if self._put_back_requested:
             self._put_back_requested = False
-            for arm in self.plant.arms:
-                arm.put_back(self.plant.body_m)
+            self.plant.put_back()
         for drive in () if self.powered else self.drives:
             drive.restart(self.now_s)  # it boots once the power is back
         wires = tuple(zip(self.drives, self._port_of_drive, strict=True))
@@ -75,7 +74,7 @@ class SimulatedRobot:
                     port.send(frame)
 
     def request_put_back(self) -> None:
-        """Put the flippers back as an operator does by hand, before the next step: safe in a signal handler."""
+        """Set the robot down as an operator does by hand, before the next step: safe in a signal handler."""
         self._put_back_requested = True
 
     def turn_emergency_stop(self) -> None:

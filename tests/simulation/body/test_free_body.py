@@ -259,6 +259,18 @@ def test_a_free_body_walks_forward_on_firm_mud(configuration: Configuration) -> 
     assert robot.loop.fault is None and robot.robot.plant.body_m > 0.02
 
 
+def test_an_overturned_body_is_set_down_on_its_belly_where_it_is(configuration: Configuration) -> None:
+    robot = Plant(plant_of(configuration, free_body=True), Track([(9.0, MUDS["48.5"])]))
+    assert isinstance(body := robot.body, FreeBody)
+    body.forward_m, body.pitch_rad, body.height_m = 0.4, -3.3, -0.1
+    robot.put_back()
+    for _ in range(500):
+        robot.step(STEP_S, Joints(0.0, 0.0, 0.0, 0.0))
+    assert body.forward_m == pytest.approx(0.4, abs=1e-3)
+    assert abs(body.pitch_rad) < 0.02
+    assert all(abs(arm.sweep_rad) < 0.02 for arm in robot.arms)
+
+
 def test_a_free_body_s_joints_have_the_configured_height(configuration: Configuration) -> None:
     higher = replace(configuration, geometry=replace(configuration.geometry, axis_height_m=0.07))
     assert plant_of(higher).body.axis_above_belly_m == 0.07
