@@ -71,6 +71,7 @@ def test_a_lost_lease_is_freed_only_by_its_holder(lease: Lease) -> None:
     lease.hang_up("anna")
     assert lease.renew("ben", 10.1, HALF_S) is not None
     assert lease.release("ben") is not None
+    lease.oust("ben")
     assert lease.lost(10.1)
     assert lease.release("anna") is None
     assert not lease.lost(1e9)

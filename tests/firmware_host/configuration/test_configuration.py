@@ -55,6 +55,12 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("[bus.left]", "[bus.left]\noptions = { a = [1] }", [
         f"bus.left.options.a = [1]: should be a valid {kind}" for kind in ("string", "integer", "number", "boolean")
     ]),
+    ("torque_nm = 0.75", "torque_nm = 0.75\nsweep_min_deg = -25.0", [
+        "limits.sweep_min_deg = -25.0: must be at most -30"
+    ]),
+    ("torque_nm = 0.75", "torque_nm = 0.75\ntemperature_warm_c = 85.0\ntemperature_hot_c = 80.0", [
+        "limits.temperature_warm_c = 85.0: must be at most limits.temperature_hot_c = 80.0"
+    ]),
     ("torque_nm = 0.75", "torque_nm = 0.75\nsweep_max_deg = 25.0", [
         "limits.sweep_max_deg = 25.0: must be at least 30"
     ]),

@@ -80,6 +80,13 @@ def test_the_event_of_another_mud_begins_a_mud_with_its_own_medians_and_speed(fo
         assert mud.speed_m_s == pytest.approx(0.12 / 1.57, rel=0.02)  # a step in the time between two insertions
 
 
+def test_a_lower_bound_counts_in_no_median(folder: Path) -> None:
+    walk, log = updated(folder)[f"{DONE}/walk.mcap"], read_log(WALK)
+    bound = log.strides[0] | {"k_p": 9e9, "k_p_at_least": True}
+    (mud,) = entry_of_log(walk, log._replace(strides=[bound, *log.strides[1:]])).muds
+    assert mud.k_p == median(stride["k_p"] for stride in log.strides[1:])
+
+
 def test_a_copy_that_an_earlier_version_exported_counts_nothing(folder: Path) -> None:
     LogFile(folder / ACTIVE / "ros.mcap", OPENING | {"metadata": {EXPORTED: "true"}}).finish()
     entry = updated(folder)[f"{DONE}/ros.mcap"]

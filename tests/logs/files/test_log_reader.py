@@ -156,6 +156,18 @@ def test_damage_is_refused_or_leaves_the_rows_intact(path: Path, whole: Log, tmp
     assert refused > 100
 
 
+def test_a_finished_log_that_lacks_rows_is_refused(path: Path, tmp_path: Path) -> None:
+    """A chunk of an unknown kind of record is passed over, as the format demands."""
+    contents = bytearray(path.read_bytes())
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    contents[summary.chunk_indexes[1].chunk_start_offset] = 0x80
+    (tmp_path / "lacks.mcap").write_bytes(contents)
+    with pytest.raises(LogError, match=r"only \d+ of its 1005 rows can be found"):
+        read_log(tmp_path / "lacks.mcap")
+
+
 @pytest.mark.parametrize("contents", [b"", b"time,turtle_state\n", MCAP0_MAGIC[:-1]])
 def test_a_file_that_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"changed\.mcap: damaged at byte 0: .* MCAP"):
