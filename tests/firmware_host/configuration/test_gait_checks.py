@@ -10,7 +10,7 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.gait_checks import gait_problems
+from firmware_host.configuration.gait_checks import depth_problem, gait_problems
 from firmware_host.configuration.gait_file import SHIPPED, gait_document, read_gait
 
 NAMES = sorted(path.stem for path in SHIPPED.glob("*.toml"))
@@ -41,6 +41,11 @@ def problems(phases: list[dict[str, Any]], configuration: Configuration, **keys:
 def test_the_gaits_that_ship_are_accepted(configuration: Configuration, name: str) -> None:
     path = read_gait(gait_document(name))
     assert not list(gait_problems(path, configuration, max(path.depths_m, default=0.03)))
+
+
+def test_a_depth_of_less_than_half_a_centimetre_is_refused(configuration: Configuration) -> None:
+    assert depth_problem(configuration, 0.005) == ""
+    assert depth_problem(configuration, 0.004).startswith("depth 0.4 cm: must be from 0.5 to 5 cm")
 
 
 UNACCEPTED = {

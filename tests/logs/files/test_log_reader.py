@@ -93,6 +93,12 @@ def test_ticks_are_an_array_with_the_fields_of_the_table_and_other_rows_are_dict
     assert [event["text"] for event in whole.events] == ["walk", "mud", "stop"]
 
 
+def test_ticks_that_earlier_segments_missed_are_not_missing_in_this_one(whole: Log) -> None:
+    """One of a hundred ticks is missed: four from the tick 500 on."""
+    summary = log_summary(whole._replace(ticks=whole.ticks[500:]))
+    assert (summary["rows"], summary["ticks"], summary["missed_ticks"]) == (500, 496, 9)
+
+
 def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
     LogFile(tmp_path / "empty.mcap", OPENING).finish()
     log = read_log(tmp_path / "empty.mcap")
