@@ -47,6 +47,8 @@ def test_faults_that_were_never_present_together_do_not_follow_from_each_other()
     assert [cause.name for cause in apart] == ["bus_off", "drive_silent"]
     (together,) = read_causes(events(bus, silent), TEXT)
     assert together.name == "bus_off" and together.consequences == ("drive_silent",)
+    (again,) = read_causes(events(bus, "over: bus_off left", bus), TEXT)
+    assert (again.first_s, again.times) == (10.0, 2)
 
 
 def test_a_cause_has_time_and_message_of_its_own_faults_and_not_of_a_consequence_of_the_same_kind() -> None:
