@@ -96,9 +96,10 @@ def test_what_cannot_be_annotated_stays_as_it_was(log: Path, tmp_path: Path) -> 
     cut.write_bytes(WALK.read_bytes()[:-100])
     other.write_text("mud A")
     tiny.write_bytes(WALK.read_bytes()[:8])
-    for path in (living.path, cut, other, tiny):
+    refusals = {living.path: "is being written", cut: "its end is", other: "is no log", tiny: "its end is"}
+    for path, reason in refusals.items():
         before = path.read_bytes()
-        with pytest.raises(LogError, match=path.name):
+        with pytest.raises(LogError, match=f"{path.name}: {reason}"):
             annotate(path, TRIAL)
         assert path.read_bytes() == before
     before = log.read_bytes()
