@@ -4,7 +4,6 @@ Hands and tiny torques use the buses in this process, as the bench does. Weights
 not let go while a disk or a terminal stalls, so they use a daemon, which this program starts on the same buses.
 """
 
-import os
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
 from typing import Any
+from zlib import crc32
 
 from experiments.actuator.bench import attended, weigh_on_robot, weigh_simulated
 from experiments.actuator.file_change import Changes, changed_text
@@ -76,7 +76,8 @@ class CalibratedRobot:
 @contextmanager
 def running_daemon(configuration: Configuration, folder: Path) -> Iterator[Path]:
     """Run a daemon with this configuration, and yield its socket. Raises BenchError where it does not start."""
-    socket = named_folder("calibration") / f"{os.getpid()}.sock"  # of this robot, where a user calibrates two
+    name = f"{crc32(bytes(folder.absolute())):08x}.sock"  # of this calibration alone, and the same when it continues
+    socket = named_folder("calibration") / name
     paths: Changes = {("status", "socket"): str(socket), ("log", "directory"): str((folder / "logs").absolute())}
     path, messages = folder / FILE, folder / "mudskipperd.txt"
     path.write_text(changed_text(configuration.text, paths), encoding="utf-8")

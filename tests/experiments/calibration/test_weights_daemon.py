@@ -44,15 +44,18 @@ with running_daemon(load_configuration(Path({str(path)!r})), Path({str(short_fol
     wait_until(lambda: not socket.exists())
 
 
-def test_two_robots_of_one_user_have_a_daemon_each(
+def test_two_robots_of_one_user_have_a_daemon_each_and_each_continues(
     short_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The readings of a joint belong to the configuration of its daemon, with all paths."""
     robots = []
     for name in ("first", "second"):
         (short_folder / name).mkdir()
         text = write_local_setup(short_folder / name, tmp_path).read_text(encoding="utf-8")
         robots.append(parse_configuration(text.replace('name = "simulated"', f'name = "{name}"')))
-    with running_daemon(robots[0], short_folder / "first"):
+    with running_daemon(robots[0], short_folder / "first") as first:
         monkeypatch.setattr(os, "getpid", lambda: 0)  # as of another program
         with running_daemon(robots[1], short_folder / "second") as socket, StatusClient(socket) as client:
             assert client.call("status")["robot"] == "second"
+    with running_daemon(robots[0], short_folder / "first") as again:
+        assert again == first
