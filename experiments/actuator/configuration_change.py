@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.actuator.file_change import Changes, FileChangeError, change_file
+from experiments.actuator.file_change import Changes, FileChangeError, change_file, lines_of
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
 from experiments.study.session import Ending, Session
@@ -73,6 +73,6 @@ def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, 
     try:
         done = change_file(path, read_text(path), changes, agrees)
     except FileChangeError as problem:
-        return f"nothing was applied: {problem}: the measurements are saved", Ending.REFUSED
+        return f"nothing was applied: {problem}. To write by hand:\n{lines_of(changes)}", Ending.REFUSED
     has_constant = any(name == "torque_constant_nm_a" for *_, name in changes)
     return done + SET_DRIVES * (is_written and has_constant), Ending.DONE

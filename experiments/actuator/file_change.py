@@ -13,7 +13,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import Table
+from tomlkit.items import Item, Table
 
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
@@ -40,10 +40,8 @@ def changed_text(text: str, changes: Changes) -> str:
     except TOMLKitError as problem:
         raise FileChangeError(f"the configuration cannot be changed: {problem}") from problem
     except ConfigurationError as problem:
-        raise FileChangeError(
-            f"the configuration stays as it is, since changed it would be invalid: {problem}. Fix that, and run the"
-            " same command again"
-        ) from problem
+        text = f"the configuration stays as it is, since changed it would be invalid: {problem}"
+        raise FileChangeError(f"{text}; correct that first") from problem
     return changed
 
 
@@ -57,12 +55,22 @@ def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: Any) 
     body = table.value.body if isinstance(table, Table) and path[-1] not in table else []
     trailing = list(reversed([*takewhile(lambda item: item[0] is None, reversed(body))]))
     del body[len(body) - len(trailing) :]
+    table[path[-1]] = _item(value)
+    body.extend(trailing)
+
+
+def _item(value: Any) -> Item:
     if isinstance(value, Mapping):
         inline = tomlkit.inline_table()
         inline.update(value)
-        value = inline
-    table[path[-1]] = value
-    body.extend(trailing)
+        return inline
+    item: Item = tomlkit.item(value)
+    return item
+
+
+def lines_of(changes: Changes) -> str:
+    """Return the keys with their new values, as they may stand in the file."""
+    return "\n".join(f"{'.'.join(path)} = {_item(value).as_string()}" for path, value in changes.items())
 
 
 def change_file(path: Path, before: str, changes: Changes, agrees: Callable[[str], bool]) -> str:
@@ -81,14 +89,13 @@ def replace_file(path: Path, before: str, after: str) -> Path:
     try:
         path = path.resolve(strict=True)  # a link stays one
         if read_text(path) != before:
-            raise FileChangeError(f"{path} was changed during this command: run it again")
+            raise FileChangeError(f"{path} was changed during this command, and stays as it is")
         backup = path.with_name(path.name + BACKUP)
         _write(backup, before, path)
         _write(path, after, path)
     except OSError as problem:
         raise FileChangeError(
-            f"{why_not(problem, path)}; nothing was changed. Run the same command as a user who may write it, such as"
-            " root"
+            f"{why_not(problem, path)}; nothing was changed. It needs a user who may write it, such as root"
         ) from problem
     return backup
 

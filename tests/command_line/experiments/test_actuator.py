@@ -2,6 +2,7 @@
 
 import json
 import os
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -167,6 +168,7 @@ def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, 
 
 
 def test_a_fit_that_cannot_be_applied_is_still_reported(tmp_path: Path, example_text: str) -> None:
+    """The lines fit the file; the same command would refuse to continue with another configuration."""
     plan, path = WeighingPlan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
     path.write_text(example_text, encoding="utf-8")
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in make_entries(plan).items()}
@@ -174,4 +176,6 @@ def test_a_fit_that_cannot_be_applied_is_still_reported(tmp_path: Path, example_
     assert fit is not None
     message, ending = apply_fit(path, fit, make_session(tmp_path, []))
     assert message.startswith("nothing was applied: the configuration stays as it is")
-    assert "current_limit_a" in message and "run the same command again" in message and ending is Ending.REFUSED
+    assert "current_limit_a" in message and ending is Ending.REFUSED
+    drive = tomllib.loads(message.partition("write by hand:\n")[2])["drive"]["right_sweep"]
+    assert drive["torque_constant_nm_a"] == round(fit.numbers["torque_constant_nm_a"], 5)

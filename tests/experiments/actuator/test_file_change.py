@@ -103,7 +103,7 @@ def test_a_file_that_cannot_be_written_stays_as_it_is(tmp_path: Path, monkeypatc
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises(FileChangeError, match=r"mudskipper.toml: Permission denied; nothing was changed. Run the same"):
+    with pytest.raises(FileChangeError, match=r"mudskipper.toml: Permission denied; nothing was changed. It needs"):
         replace_file(path, "a = 1\n", "a = 2\n")
     assert path.read_text(encoding="utf-8") == "a = 1\n"
     assert [each.name for each in tmp_path.iterdir()] == ["mudskipper.toml"]
