@@ -2,7 +2,7 @@
 
 import tracemalloc
 from collections.abc import Callable, Mapping
-from math import degrees
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from tests.scripted_operator import ScriptedOperator
 
 Changes = Mapping[tuple[str, ...], Any]
 CONFIGURATION = simulated_configuration()
+STOPS_DEG = {"min": -110.0, "max": 110.0}
 CUBEMARS = simulated_configuration(drive_type="mit:AK80-9")
 
 
@@ -76,6 +77,27 @@ def test_a_limit_beyond_a_stop_is_narrowed_to_one_degree_before_it(tmp_path: Pat
     wide = with_changes(CONFIGURATION, {("limits", "sweep_max_deg"): 110.0})
     found = hand_changes(wide, move_by_hand(tmp_path, wide, {}, "left_sweep"))
     assert found == {("limits", "sweep_max_deg"): 98.0}
+
+
+def test_limits_are_narrowed_for_the_joint_with_the_least_range_on_either_side() -> None:
+    """A level that a hand cannot tell from zero shifts nothing."""
+
+    def ends(front_deg: float, rear_deg: float) -> Entry:
+        return {"front_rad": radians(front_deg), "rear_rad": radians(rear_deg), "velocity_scale": 1.04}
+
+    wide = with_changes(CONFIGURATION, {("limits", f"sweep_{end}_deg"): deg for end, deg in STOPS_DEG.items()})
+    entries = {
+        level_key("left"): {"left_sweep": radians(1.9)},
+        level_key("right"): {"right_sweep": radians(-10.0)},
+        "left_sweep: ends": ends(90.0, -95.5),
+        "right_sweep: ends": ends(75.5, -109.0),
+    }
+    zero_turn = wide.drive["right_sweep"].zero_turn - wide.drive["right_sweep"].sign * 10.0 / 360.0
+    assert hand_changes(wide, entries) == {
+        ("drive", "right_sweep", "zero_turn"): pytest.approx(zero_turn, abs=1e-5),
+        ("limits", "sweep_min_deg"): -94.0,
+        ("limits", "sweep_max_deg"): 84.0,
+    }
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
