@@ -25,7 +25,7 @@ def readings(force_n: float, seed: int, drift: float = 0.0, per_newton: float = 
 
 def test_two_weights_determine_span_and_zero_within_their_standard_errors() -> None:
     for seed in range(20):
-        light, heavy = weigh(0.0, readings(0.0, seed)), weigh(4.9, readings(4.9, seed + 100))
+        light, heavy = weigh(0.5, readings(0.5, seed)), weigh(4.9, readings(4.9, seed + 100))
         reported = calibrate("counts", light, heavy)
         assert abs(reported.per_newton - 42000.0) < 4.0 * reported.per_newton_std_error
         assert abs(reported.zero - 81000.0) < 4.0 * reported.zero_std_error
@@ -56,7 +56,7 @@ def test_weights_that_determine_no_span_are_refused(
 def test_a_drift_is_reported() -> None:
     light, heavy = weigh(0.0, readings(0.0, 1, drift=60.0)), weigh(4.9, readings(4.9, 2, per_newton=-42000.0))
     reported = remarks_about(calibrate("counts", light, heavy), light, heavy)
-    assert ["drifted" in each for each in reported] == [True]
+    assert ["drifted by -0.112 N" in each for each in reported] == [True]
 
 
 def test_a_calibration_reads_back(tmp_path: Path) -> None:
@@ -83,9 +83,16 @@ def test_a_file_that_is_no_calibration_is_refused_by_its_name(tmp_path: Path, te
         read_calibration(path)
 
 
-def test_an_amplifier_that_prints_grams_needs_no_weights() -> None:
-    grams = calibration_of_unit("g", None)
-    assert grams is not None and grams.force_n(1000.0) == pytest.approx(9.80665)
+@pytest.mark.parametrize(
+    ("unit", "newtons"),
+    [("N", 1.0), ("mN", 1e-3), ("kN", 1e3), ("mg", 9.80665e-6), ("g", 9.80665e-3), ("kg", 9.80665), ("lb", 4.448222)],
+)
+def test_an_amplifier_that_prints_a_weight_or_a_force_needs_no_weights(unit: str, newtons: float) -> None:
+    reported = calibration_of_unit(unit, None)
+    assert reported is not None and reported.force_n(1.0) == pytest.approx(newtons, rel=1e-6)
+
+
+def test_counts_need_a_scale() -> None:
     scaled = calibration_of_unit("counts", 2.5e-5)
     assert scaled is not None and scaled.force_n(40000.0) == pytest.approx(1.0)
     assert calibration_of_unit("counts", None) is None

@@ -43,7 +43,7 @@ def test_an_overloaded_indicator_says_so(line: bytes) -> None:
     assert reading is not None and isnan(reading.value)
 
 
-@pytest.mark.parametrize("line", [b"8388607", b"-8388608"])
+@pytest.mark.parametrize("line", [b"8388607", b"-8388608", b"8388607 counts"])
 def test_the_ends_of_a_converter_are_an_overload(line: bytes) -> None:
     reading = LineFormat("number").decode(line)
     assert reading is not None and isnan(reading.value)
