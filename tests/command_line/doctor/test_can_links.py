@@ -86,9 +86,11 @@ def test_an_interface_that_is_down_fails_with_the_command_that_brings_it_up() ->
         ({"bitrate": 500000}, "load.left", Level.WARN),
         ({"sample_point": "0.600"}, "sample_point.left", Level.WARN),
         ({"sample_point": "0.875"}, "sample_point.left", Level.OK),
+        ({"sample_point": "0.950"}, "sample_point.left", Level.WARN),
         ({"restart_ms": 0}, "restart.left", Level.WARN),
+        ({"restart_ms": 5000}, "restart.left", Level.WARN),
         ({"txqlen": 10}, "queue.left", Level.WARN),
-        ({"txqlen": 1000}, "queue.left", Level.WARN),
+        ({"txqlen": 100}, "queue.left", Level.WARN),
     ],
 )
 def test_each_setting_is_evaluated(details: dict[str, Any], line: str, level: Level) -> None:

@@ -40,6 +40,7 @@ def test_a_loop_shows_friction_and_no_reversible_work(duration_s: float) -> None
     speed_rad_s = pi / 4.0 * HALF_RAD * pi / duration_s  # mean over the path of half a cosine
     assert loop.speed_rad_s == pytest.approx(speed_rad_s, rel=1e-3)
     assert loop.spent_a == pytest.approx(DRY_A + VISCOUS_A_S * speed_rad_s, rel=1e-3)
+    assert loop.held_a == pytest.approx(0.6, abs=0.015)  # the weight alone
 
 
 def test_a_stop_within_a_loop_does_no_work() -> None:

@@ -1,5 +1,9 @@
 """The report of a calibration shows the results and their sources."""
 
+from dataclasses import replace
+
+import pytest
+
 from experiments.actuator.fit import fit_joint
 from experiments.actuator.plots import draw_torques
 from experiments.actuator.report import make_result
@@ -17,6 +21,19 @@ def test_without_loops_there_is_a_report_without_friction() -> None:
     (friction,) = result.tables[1].rows.to_dict("records")
     assert (friction["dry friction"], friction["viscous"]) == ("-", "-")
     assert result.json()["joints"][0]["friction_nm"] is None
+
+
+@pytest.mark.parametrize(
+    ("joint", "sign", "is_remarked"),
+    [("right_adduction", 1.0, False), ("right_adduction", -1.0, True), ("right_sweep", -1.0, False)],
+)
+def test_weights_that_pull_an_adduction_joint_upwards_are_remarked(joint: str, sign: float, is_remarked: bool) -> None:
+    """The motor's current is positive where it lifts; a sweep joint may be mounted on either side."""
+    entries = make_entries(sign=sign)
+    fit = fit_joint(joint, PLAN, entries, 0.083)
+    assert fit is not None and fit.numbers["torque_constant_nm_a"] > 0.0
+    result = make_result(replace(PLAN, joints=(joint,)), {joint: entries}, [fit], None, simulated=False)
+    assert any(f"check drive.{joint}.sign" in note for note in result.notes) is is_remarked
 
 
 def test_the_lowest_panel_of_each_column_names_its_axis() -> None:
