@@ -40,30 +40,18 @@ class PlateStep(NamedTuple):
     twist: Twist
 
 
-# The submerged part of one strip of a column, a bare tuple because each step has twenty of them: the height of its
-# middle above the lower edge, the depth of that middle, the submerged height, and the mud's strength there.
-Strip = tuple[float, float, float, float]
+# Bare tuples, because each step has four columns.
+Heights = tuple[float, float, float]  # submerged above the foot, of the foot above the lower edge, and of one strip
+Pressing = tuple[float, float, float]  # breadth in m, velocity across in m/s, and how it grows upward
+Rubbing = tuple[float, complex, float]  # breadth of all surfaces, velocity along, and how its outward part grows upward
+ColumnForce = tuple[float, float, complex, float]  # across and its moment, along and the moment of its outward part
+NOT_RUBBED: Rubbing = (0.0, 0j, 0.0)
 
 
-def submerged_strips(step: PlateStep, outward_m: float, foot_m: float, strip_m: float) -> list[Strip]:
-    """Return the strips in the mud of a column whose foot is `outward_m` outward, at the height `foot_m`."""
-    clay, (depth_m, per_outward, per_upward, _) = step.clay, step.attitude
-    submerged_m = (depth_m + per_outward * outward_m) / per_upward - foot_m
-    strips, strength_pa, layers = [], clay.strength_pa, clay.layers
-    for strip in range(STRIPS):
-        low_m = strip * strip_m
-        covered_m = submerged_m - low_m
-        if covered_m <= 0.0:
-            break
-        if covered_m > strip_m:
-            covered_m = strip_m
-        middle_m = low_m + covered_m / 2.0
-        depth_m = (submerged_m - middle_m) * per_upward
-        if layers:
-            half_m = covered_m * per_upward / 2.0
-            strength_pa = clay.mean_strength_pa(depth_m - half_m, depth_m + half_m)
-        strips.append((foot_m + middle_m, depth_m, covered_m, strength_pa))
-    return strips
+def surface_above_edge_m(attitude: Attitude, outward_m: float) -> float:
+    """Return how high above the lower edge the mud's surface meets a column."""
+    depth_m, per_outward, per_upward, _ = attitude
+    return (depth_m + per_outward * outward_m) / per_upward
 
 
 class Springs:
@@ -81,88 +69,78 @@ class Springs:
         self._fractions = [fraction * remaining for fraction in self._fractions]
 
 
-class PressedColumn(Springs):
-    """The mud that a column of strips presses on."""
+class Column(Springs):
+    """The mud on a column of strips: what it presses on, and what sticks to it.
 
-    def __init__(self, profile_width_m: float, yield_m: float) -> None:
+    The strain of what sticks is a vector in the plate's plane, outward + i upward.
+    """
+
+    def __init__(self, profile_width_m: float, across_yield_m: float, along_yield_m: float) -> None:
         """`profile_width_m`: of the whole body, for the pressure law."""
         super().__init__(STRIPS)
         self.profile_width_m = profile_width_m
-        self.yield_m = yield_m
-
-    def step(
-        self, step: PlateStep, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
-    ) -> tuple[float, float]:
-        """Return the force against a motion that grows by `per_upward_s` upward, and its moment."""
-        dt_s, clay, rate, _, _ = step
-        layered, per_yield = bool(clay.layers), dt_s / self.yield_m
-        rise_per_m = lateral_rise_per_m(clay.strength_pa, self.profile_width_m)
-        pressed_n_m = clay.strength_pa * breadth_m
-        moved, per_m = per_yield * speed_m_s, per_yield * per_upward_s
-        fractions, limits_n = self._fractions, self._limits_n
-        force_n = moment_nm = 0.0
-        for place, (above_edge_m, depth_m, covered_m, strength_pa) in enumerate(strips):
-            if layered:
-                rise_per_m = lateral_rise_per_m(strength_pa, self.profile_width_m)
-                pressed_n_m = strength_pa * breadth_m
-            factor = SURFACE_FACTOR + rise_per_m * depth_m
-            limit_n = (factor if factor < DEEP_FACTOR else DEEP_FACTOR) * pressed_n_m * covered_m
-            fraction, before_n = fractions[place], limits_n[place]
-            if limit_n > before_n:
-                fraction *= before_n / limit_n
-            fraction = fraction - moved - per_m * above_edge_m
-            fraction = -rate if fraction < -rate else rate if fraction > rate else fraction
-            fractions[place], limits_n[place] = fraction, limit_n
-            load_n = fraction * limit_n
-            force_n += load_n
-            moment_nm += load_n * above_edge_m
-        limits_n[len(strips) :] = DRY_N[len(strips) :]
-        return force_n, moment_nm
-
-
-class RubbedColumn(Springs):
-    """The mud that sticks to a column: its strain is a vector in the plate's plane, outward + i upward."""
-
-    def __init__(self, yield_m: float) -> None:
-        super().__init__(STRIPS)
-        self.yield_m = yield_m
+        self.across_yield_m = across_yield_m
+        self.along_yield_m = along_yield_m
 
     def reset(self) -> None:
         super().reset()
         self._strains = [0j] * STRIPS
+        self._sticking_n = [0.0] * STRIPS
 
     def fade(self, remaining: float) -> None:
+        super().fade(remaining)
         self._strains = [strain * remaining for strain in self._strains]
 
-    def step(
-        self, step: PlateStep, strips: list[Strip], breadth_m: float, velocity_m_s: complex, per_upward_s: float
-    ) -> tuple[complex, float]:
-        """Return the force against a motion whose outward part grows by `per_upward_s` upward, and that part's moment.
-
-        `breadth_m`: of all surfaces that mud sticks to.
-        """
-        dt_s, clay, rate, _, _ = step
-        layered, per_yield = bool(clay.layers), dt_s / self.yield_m
-        sticking_n_m = ADHESION * clay.strength_pa * breadth_m
-        moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
-        strains, limits_n = self._strains, self._limits_n
-        force_n, moment_nm = 0j, 0.0
-        for place, (above_edge_m, _, covered_m, strength_pa) in enumerate(strips):
-            if layered:
-                sticking_n_m = ADHESION * strength_pa * breadth_m
-            limit_n = sticking_n_m * covered_m
-            strain, before_n = strains[place], limits_n[place]
+    def step(self, step: PlateStep, heights: Heights, pressing: Pressing, rubbing: Rubbing) -> ColumnForce:
+        """Move the column for a step: one loop does everything to a strip, as each step has twenty of them."""
+        dt_s, (_, strength_pa, layers), rate, (_, _, per_upward, _), _ = step
+        (submerged_m, foot_m, strip_m), (breadth_m, speed_m_s, faster_s) = heights, pressing
+        sticky_m, velocity_m_s, outward_faster_s = rubbing
+        rise_per_m = lateral_rise_per_m(strength_pa, self.profile_width_m)
+        per_yield, per_slip = dt_s / self.across_yield_m, dt_s / self.along_yield_m
+        moved, moved_per_m = per_yield * speed_m_s, per_yield * faster_s
+        slipped, slipped_per_m = per_slip * velocity_m_s, per_slip * outward_faster_s
+        fractions, limits_n, strains, sticking_n = self._fractions, self._limits_n, self._strains, self._sticking_n
+        force_n, moment_nm, along_n, outward_nm = 0.0, 0.0, 0j, 0.0
+        for strip in range(STRIPS):
+            low_m = strip * strip_m
+            covered_m = submerged_m - low_m
+            if covered_m <= 0.0:
+                if limits_n[strip]:
+                    limits_n[strip:] = sticking_n[strip:] = DRY_N[strip:]
+                break
+            covered_m = strip_m if covered_m > strip_m else covered_m
+            middle_m = low_m + covered_m / 2.0
+            depth_m, above_edge_m = (submerged_m - middle_m) * per_upward, foot_m + middle_m
+            if layers:
+                strength_pa, rise_per_m = self._in_layers(step.clay, depth_m, covered_m * per_upward / 2.0)
+            factor = SURFACE_FACTOR + rise_per_m * depth_m
+            limit_n = (factor if factor < DEEP_FACTOR else DEEP_FACTOR) * (strength_pa * breadth_m) * covered_m
+            fraction, before_n = fractions[strip], limits_n[strip]
+            if limit_n > before_n:
+                fraction *= before_n / limit_n
+            fraction = fraction - moved - moved_per_m * above_edge_m
+            fraction = -rate if fraction < -rate else rate if fraction > rate else fraction
+            fractions[strip], limits_n[strip] = fraction, limit_n
+            force_n, moment_nm = force_n + fraction * limit_n, moment_nm + fraction * limit_n * above_edge_m
+            if not sticky_m:
+                continue
+            limit_n = ADHESION * strength_pa * sticky_m * covered_m
+            strain, before_n = strains[strip], sticking_n[strip]
             if limit_n > before_n:
                 strain *= before_n / limit_n
-            strain = strain - moved - per_m * above_edge_m
+            strain = strain - slipped - slipped_per_m * above_edge_m
             stretch = abs(strain)
             if stretch > rate:
                 strain *= rate / stretch
-            strains[place], limits_n[place] = strain, limit_n
-            force_n += strain * limit_n
-            moment_nm += strain.real * limit_n * above_edge_m
-        limits_n[len(strips) :] = DRY_N[len(strips) :]
-        return force_n, moment_nm
+            strains[strip], sticking_n[strip] = strain, limit_n
+            along_n, outward_nm = along_n + strain * limit_n, outward_nm + strain.real * limit_n * above_edge_m
+        return force_n, moment_nm, along_n, outward_nm
+
+    def _in_layers(self, clay: Clay, depth_m: float, half_m: float) -> tuple[float, float]:
+        """Return the mean strength of a strip's layers, and the rise of pressure with depth there."""
+        strength_pa = clay.mean_strength_pa(depth_m - half_m, depth_m + half_m)
+        return strength_pa, lateral_rise_per_m(strength_pa, self.profile_width_m)
 
 
 class LowerEdge(Springs):

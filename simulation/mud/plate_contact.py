@@ -24,14 +24,14 @@ from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.ground_contact import GroundContact
 from simulation.mud.mud_springs import (
     LENGTHWAYS_YIELD_M,
+    NOT_RUBBED,
     SIDEWAYS_YIELD_M,
     STRIPS,
+    Column,
     LowerEdge,
     PlateStep,
-    PressedColumn,
-    RubbedColumn,
     Springs,
-    submerged_strips,
+    surface_above_edge_m,
 )
 from simulation.mud.plate_panels import GAUSS, Panel, panels_of, sides_m
 from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench, speed_of_edge_m_s
@@ -48,10 +48,10 @@ class PanelContact:
         """`side_m`: thickness of the narrow side that a column counts."""
         self.panel = panel
         self._side_m = side_m
-        self._pressed = [PressedColumn(size.width_m, reach * SIDEWAYS_YIELD_M) for _ in range(2)]
-        self._rubbed = [RubbedColumn(reach * LENGTHWAYS_YIELD_M) for _ in range(2)]
-        self._edge = LowerEdge(size.thickness_m, reach * LENGTHWAYS_YIELD_M)
-        self.parts: tuple[Springs, ...] = (*self._pressed, *self._rubbed, self._edge)
+        across_m, along_m = reach * SIDEWAYS_YIELD_M, reach * LENGTHWAYS_YIELD_M
+        self._columns = [Column(size.width_m, across_m, along_m) for _ in range(2)]
+        self._edge = LowerEdge(size.thickness_m, along_m)
+        self.parts: tuple[Springs, ...] = (*self._columns, self._edge)
 
     def step(self, step: PlateStep) -> tuple[float, ...]:
         """Return the panel's part of the wrench."""
@@ -68,11 +68,10 @@ class PanelContact:
     def _step_column(self, step: PlateStep, half: int, outward_m: float, breadth_m: float) -> tuple[float, ...]:
         v_n, v_r, v_s, n_u, n_s, r_s, s_u = step.twist
         foot_m, strip_m = self.panel.foot_at_m(outward_m), self.panel.length_at_m(outward_m) / STRIPS
-        strips = submerged_strips(step, outward_m, foot_m, strip_m)
-        normal_n, normal_nm = self._pressed[half].step(step, strips, breadth_m, v_n + n_u * outward_m, n_s)
-        sticky_m = 2.0 * breadth_m + self._side_m
-        velocity_m_s = complex(v_r, v_s + s_u * outward_m)
-        along_n, outward_nm = self._rubbed[half].step(step, strips, sticky_m, velocity_m_s, r_s)
+        heights = surface_above_edge_m(step.attitude, outward_m) - foot_m, foot_m, strip_m
+        pressing = breadth_m, v_n + n_u * outward_m, n_s
+        rubbing = 2.0 * breadth_m + self._side_m, complex(v_r, v_s + s_u * outward_m), r_s
+        normal_n, normal_nm, along_n, outward_nm = self._columns[half].step(step, heights, pressing, rubbing)
         up_n = along_n.imag
         return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
 
@@ -89,13 +88,12 @@ class PlateContact(GroundContact):
         side_m = 0.0 if size.corners_m else size.thickness_m  # a rectangle's columns count its narrow sides
         self._panels = [PanelContact(size, panel, side_m, reach) for panel in panels_of(size)]
         self._sides_m = sides_m(size, STRIPS)
-        self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, yield_m) for _ in range(2))
-        self._rubbed_sides = [(RubbedColumn(yield_m), side_m) for side_m in self._sides_m] if size.corners_m else []
+        self._half_side_m = size.thickness_m / 2.0
+        self._inner_side, self._outer_side = (Column(size.thickness_m, yield_m, yield_m) for _ in range(2))
         self._parts: tuple[Springs, ...] = (
             *(part for panel in self._panels for part in panel.parts),
             self._inner_side,
             self._outer_side,
-            *(side for side, _ in self._rubbed_sides),
         )
         self.reset()
 
@@ -115,10 +113,9 @@ class PlateContact(GroundContact):
     def wrench(self, step: PlateStep) -> Wrench:
         """Return the sum over all pieces."""
         parts = [panel.step(step) for panel in self._panels]
-        parts += [self._rub_side(step, side, outward_m) for side, outward_m in self._rubbed_sides]
+        inner_n, inner_nm = self._step_side(parts, step, self._inner_side, self._sides_m[0])
+        outer_n, outer_nm = self._step_side(parts, step, self._outer_side, self._sides_m[1])
         n, r, s, n_u, n_s, r_s, s_u = parts[0] if len(parts) == 1 else map(sum, zip(*parts, strict=True))
-        inner_n, inner_nm = self._step_side(step, self._inner_side, self._sides_m[0])
-        outer_n, outer_nm = self._step_side(step, self._outer_side, self._sides_m[1])
         return Wrench(n, r + inner_n + outer_n, s, n_u, n_s, r_s + inner_nm + outer_nm, s_u)
 
     def _relax(self, dt_s: float, speed_m_s: float) -> None:
@@ -135,16 +132,19 @@ class PlateContact(GroundContact):
         for part in self._parts:
             part.fade(remaining)
 
-    def _rub_side(self, step: PlateStep, side: RubbedColumn, outward_m: float) -> tuple[float, ...]:
-        """Return the part of the mud that sticks to a narrow side in the wrench."""
+    def _step_side(
+        self, parts: list[tuple[float, ...]], step: PlateStep, side: Column, outward_m: float
+    ) -> tuple[float, float]:
+        """Return the force outward, and its moment upward; add that of the mud that sticks to the side to the parts."""
         _, v_r, v_s, _, _, r_s, s_u = step.twist
-        strips = submerged_strips(step, outward_m, 0.0, self._strip_m)
-        velocity_m_s = complex(v_r, v_s + s_u * outward_m)
-        along_n, outward_nm = side.step(step, strips, self.size.thickness_m, velocity_m_s, r_s)
-        return 0.0, along_n.real, along_n.imag, 0.0, 0.0, outward_nm, along_n.imag * outward_m
-
-    def _step_side(self, step: PlateStep, side: PressedColumn, outward_m: float) -> tuple[float, float]:
-        """Return the force outward, and its moment upward."""
-        strips, twist = submerged_strips(step, outward_m, 0.0, self._strip_m), step.twist
-        breadth_m = self.size.thickness_m / 2.0
-        return side.step(step, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)
+        heights, pressing = (
+            (surface_above_edge_m(step.attitude, outward_m), 0.0, self._strip_m),
+            (self._half_side_m, v_r, r_s),
+        )
+        if not self.size.corners_m:
+            force_n, moment_nm, _, _ = side.step(step, heights, pressing, NOT_RUBBED)
+            return force_n, moment_nm
+        rubbing = self.size.thickness_m, complex(v_r, v_s + s_u * outward_m), r_s
+        force_n, moment_nm, along_n, outward_nm = side.step(step, heights, pressing, rubbing)
+        parts.append((0.0, along_n.real, along_n.imag, 0.0, 0.0, outward_nm, along_n.imag * outward_m))
+        return force_n, moment_nm
