@@ -26,7 +26,7 @@ from drivers.power_switch import PowerSwitch
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.lease import Lease
-from firmware_host.log.recorder import Recording
+from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.log.rows import TICK_KIND, tick_kind, tick_row
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
@@ -43,20 +43,22 @@ class Loop:
         configuration: Configuration,
         drives: Drives,
         pose: PoseSource,
-        recorder: Recording,
+        recorder: Recording | None,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
         period_s: float = PERIOD_S,
         power_switch: PowerSwitch | None = None,
     ) -> None:
+        """`recorder`: None where nobody reads the rows, so that none is made."""
         self.period_s = period_s
         self.configuration = configuration
         self.drives = drives
         self.pose = pose
         self.power_switch = power_switch
-        self.recorder = recorder
+        self.recorder: Recording = recorder or NullRecorder()
+        self._makes_rows = recorder is not None
         self.lease = Lease()
-        self.events = LoopEvents(recorder, configuration.motion.longest_hold_s, configuration.bus_of)
+        self.events = LoopEvents(self.recorder, configuration.motion.longest_hold_s, configuration.bus_of)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = _make_controller(configuration)
@@ -245,7 +247,14 @@ class Loop:
 
     def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s
-        row = tick_row(
+        if self._makes_rows:
+            self.recorder.put(TICK_KIND, self._row(tick, sent_after_s))
+        if self.controller.recovery.events:
+            self.events.report(tick.now_s, self.controller.recovery.events)
+        self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
+
+    def _row(self, tick: Tick, sent_after_s: float) -> bytes:
+        return tick_row(
             self._tick_kind,
             tick,
             sent_after_s,
@@ -259,10 +268,6 @@ class Loop:
             mode=self.mode,
             power_cut=self.fault_monitor.power_cut != "",
         )
-        self.recorder.put(TICK_KIND, row)
-        if self.controller.recovery.events:
-            self.events.report(tick.now_s, self.controller.recovery.events)
-        self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
 
     def request(
         self, request: Request, now_s: float, order: WalkOrder | None = None, forced: str = "", by: str = ""

@@ -29,7 +29,6 @@ from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.configuration.consistency import contradictions
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick, Ticker
 from operator_client.status_client import NoDaemonError, NotPermittedError, StatusClient
@@ -64,7 +63,7 @@ class HardwareRig:
             self._locks = stack.pop_all()
         self.overheard = listen(ports, configuration.drive, time.monotonic(), _wait_briefly)
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
+        self.loop = Loop(configuration, drives, NoPose(), None)
         self._processors = os.sched_getaffinity(0)
         options = configuration.loop
         # about the operating system, for the operator
@@ -171,7 +170,7 @@ class SimulatedRig:
             ear.close()
         wires = {name: bus.open() for name, bus in self.buses.items()}
         robot_drives = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, robot_drives, NoPose(), NullRecorder(), lambda: self.now_s, lambda: self.now_s)
+        self.loop = Loop(configuration, robot_drives, NoPose(), None, lambda: self.now_s, lambda: self.now_s)
         self.warnings: Sequence[str] = ()
 
     @property

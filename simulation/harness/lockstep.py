@@ -26,7 +26,6 @@ from firmware_host.ticker import Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.drive_types import DriveMaker, make_simulated_drive
 from simulation.devices.motion_capture import SimulatedPose
 from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.harness.robot import SimulatedRobot
@@ -92,7 +91,7 @@ class Lockstep:
     up late by `late_s`, less than a period, and the wall clock is ahead by `wall_offset_s`.
     """
 
-    _make_drive: DriveMaker = staticmethod(make_simulated_drive)
+    _kind_of_robot: type[SimulatedRobot] = SimulatedRobot
 
     def __init__(
         self,
@@ -114,22 +113,21 @@ class Lockstep:
         self.late_ticks = 0
         self.wall_offset_s = 0.0
         self.buses = buses or {name: MockBus() for name in configuration.bus}
-        self.robot = SimulatedRobot(
+        self.robot = self._kind_of_robot(
             plant or plant_of(configuration, disturbances, fixed_base),
             track,
             drives or drives_of(configuration, **drive_changes(disturbances)),
             configuration.bus_of,
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
-            make_drive=self._make_drive,
         )
         pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        rows, wall_clock = recorder or NullRecorder(), self._wall_s
+        wall_clock = self._wall_s
         if failures is not None:
-            pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
+            pose, recorder = FailingPose(pose, failures), FailingRecorder(recorder or NullRecorder(), failures)
             wall_clock = FailingClock(wall_clock, failures)
         drives_of_loop = self._connect(configuration, failures)
-        self.loop = Loop(configuration, drives_of_loop, pose, rows, self._now_s, wall_clock, period_s)
+        self.loop = Loop(configuration, drives_of_loop, pose, recorder, self._now_s, wall_clock, period_s)
         self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)

@@ -15,7 +15,6 @@ from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.drive_types import make_drives
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
@@ -70,7 +69,7 @@ class SerialWalk(Lockstep):
         self.lines = {name: Line(port) for name, port in self.loop.drives.ports.items()}
         ports = {name: line.port for name, line in self.lines.items()}
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, drives, self.loop.pose, NullRecorder(), lambda: self.now_s)
+        self.loop = Loop(configuration, drives, self.loop.pose, None, lambda: self.now_s)
 
     def step(self) -> None:
         self.tick_number += 1
