@@ -27,8 +27,6 @@ class DirectDrive(SimulatedOdrive):
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self._rad_per_turn = parameters.sign * TURN_RAD
-        changes_by_itself = parameters.current_lag_s or parameters.cogging_nm or parameters.encoder_slip_rad_s
-        self._keeps_torque = not changes_by_itself  # from one command to the next
         super().__init__(replace(parameters, watchdog_s=0.0), random)
 
     def reset(self, now_s: float) -> None:
@@ -39,36 +37,31 @@ class DirectDrive(SimulatedOdrive):
         self._sampled_angle = self._sampled_speed = self._sampled_a = UNKNOWN
         self._angle_stamp_s = self._current_stamp_s = self._state_stamp_s = NEVER_S
         self._reports_torque = False
-        self._kept_nm: float | None = None  # since the newest command
 
     def command(self, torque_nm: float) -> None:
         """Set the joint's torque."""
         self._setpoint_nm = self.parameters.sign * torque_nm
-        self._kept_nm = None
 
-    def torque_nm(self, now_s: float) -> float:
-        """Return the torque, computed once for each command where nothing else changes it."""
-        torque_nm = self._kept_nm
-        if torque_nm is None:
-            torque_nm = super().torque_nm(now_s)
-            if self._keeps_torque:
-                self._kept_nm = torque_nm
-        return torque_nm
+    @property
+    def changes_by_itself(self) -> bool:
+        """Whether torque or encoder change from one command to the next, other than by the motion."""
+        parameters = self.parameters
+        return bool(parameters.current_lag_s or parameters.cogging_nm or parameters.encoder_slip_rad_s)
 
-    def cyclic_frames(self, now_s: float) -> tuple[()]:
-        """Take the samples that are due; no frame carries them."""
+    def sample(self, now_s: float, angle_rad: float, velocity_rad_s: float) -> None:
+        """Take the samples that are due, of a joint with this motion."""
         periods = self.parameters
         if now_s >= self._angle_due_s:
+            self.measure(angle_rad, velocity_rad_s)
             self._angle_due_s += periods.encoder_period_s
             self._sampled_angle, self._sampled_speed = self._measured_angle(), self._measured_speed()
             self._angle_stamp_s = now_s
         if now_s >= self._current_due_s:
             self._current_due_s += periods.current_period_s
-            self._sampled_a, self._current_stamp_s = self._measured_a(), now_s
+            self._sampled_a, self._current_stamp_s = self._current_a + self._noise(periods.current_noise_a), now_s
         if now_s >= self._state_due_s:
             self._state_due_s += periods.heartbeat_period_s
             self._reports_torque, self._state_stamp_s = self.energised, now_s
-        return ()
 
     @property
     def state(self) -> DriveState:

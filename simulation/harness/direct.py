@@ -10,7 +10,8 @@ from control.records import Joints
 from drivers.drives import Drives
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
-from simulation.devices.direct import DirectDrive, DirectDrives
+from simulation.devices.direct import DirectDrives
+from simulation.harness.direct_robot import DirectRobot
 from simulation.harness.load_monitor import LoadMonitor
 from simulation.harness.lockstep import Lockstep
 
@@ -18,7 +19,7 @@ from simulation.harness.lockstep import Lockstep
 class Direct(Lockstep):
     """Takes the arguments of Lockstep but `failures` and `buses`."""
 
-    _make_drive = DirectDrive
+    _kind_of_robot = DirectRobot
 
     def __init__(self, configuration: Configuration, *args: Any, **rest: Any) -> None:
         super().__init__(configuration, *args, **rest)

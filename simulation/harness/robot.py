@@ -13,7 +13,7 @@ from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.drive_types import DriveMaker, connect_drives, make_simulated_drive
+from simulation.devices.drive_types import connect_drives, make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster
 from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.mud.track import Track
@@ -31,12 +31,11 @@ class SimulatedRobot:
         ports: Mapping[str, CanPort],
         seed: int = 1,
         start_s: float = 0.0,
-        make_drive: DriveMaker = make_simulated_drive,
     ) -> None:
         random = Random(seed)
         self.plant = Plant(plant, track, Random(f"mud {seed}"))  # independent of the drives' draws
         joints = plant.rig.joints
-        self.drives: Joints[SimulatedDrive] = Joints(*(make_drive(drives[joint], random) for joint in joints))
+        self.drives: Joints[SimulatedDrive] = Joints(*(self._make_drive(drives[joint], random) for joint in joints))
         self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in joints)
         self._drives_on = [
             (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])
@@ -53,14 +52,21 @@ class SimulatedRobot:
             drive.reset(start_s)
         self._measure()
 
+    def _make_drive(self, parameters: SimulatedDriveParameters, random: Random) -> SimulatedDrive:
+        return make_simulated_drive(parameters, random)
+
     def advance(self, until_s: float) -> None:
-        """Execute the frames that have arrived, then simulate until `until_s` and send messages as they come due."""
+        """Execute the frames that have arrived, then simulate until `until_s`."""
         self._execute_frames()
         if self._put_back_requested:
             self._put_back_requested = False
             self.plant.put_back()
         for drive in () if self.powered else self.drives:
             drive.restart(self.now_s)  # it boots once the power is back
+        self._simulate(until_s)
+
+    def _simulate(self, until_s: float) -> None:
+        """Step mechanics and drives until `until_s`, and send messages as they come due."""
         wires = tuple(zip(self.drives, self._port_of_drive, strict=True))
         while self.now_s + STEP_S <= until_s:
             self.now_s = now_s = self.now_s + STEP_S
