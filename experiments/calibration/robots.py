@@ -35,7 +35,7 @@ from simulation.harness.blocks import on_blocks
 from simulation.harness.local_setup import named_folder
 from simulation.harness.peer import end_with_parent
 
-STARTING_S, ENDING_S, POLL_S = 10.0, 20.0, 0.1
+STARTING_S, ENDING_S, POLL_S = 30.0, 20.0, 0.1
 FILE = "mudskipper.toml"  # of the daemon that holds the weights
 
 
