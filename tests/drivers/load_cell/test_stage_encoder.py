@@ -1,6 +1,7 @@
 """A stage's encoder over a real tty, with failures of the counter at its other end."""
 
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -15,11 +16,11 @@ SPEED_M_S = 0.1
 
 
 class Rail(InstrumentBench):
-    """A stage that moves evenly, its counter, and the encoder that reads it."""
+    """A stage that moves evenly, its counter, and the encoder that reads it; the counter may begin at zero again."""
 
-    def __init__(self, folder: Path, **changes: float) -> None:
+    def __init__(self, folder: Path, restarts_s: float = inf, **changes: float) -> None:
         parameters = StageEncoderParameters(**changes)  # type: ignore[arg-type]
-        counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * at_s, parameters, folder / "encoder")
+        counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * (at_s % restarts_s), parameters, folder / "encoder")
         super().__init__(counter, StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5)))
 
 
@@ -47,6 +48,13 @@ def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail)
     positions = rail.run(1.5)
     assert rail.port.breaks == 1
     assert positions[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
+
+
+def test_a_counter_that_begins_at_zero_again_reports_that_its_zero_changed(tmp_path: Path) -> None:
+    rail = Rail(tmp_path, restarts_s=1.5)
+    rail.run(2.5)
+    assert rail.port.breaks == 1
+    rail.close()
 
 
 def test_an_encoder_without_messages_is_silent(tmp_path: Path) -> None:
