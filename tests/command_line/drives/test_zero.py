@@ -40,6 +40,7 @@ def test_the_present_position_becomes_angle_zero(
     assert not any(bus.energised for bus in bench.buses.values())
     again = run("drives", "zero", joint, "--config", str(bench.config), "--yes")
     assert "stood at 0.00°" in again.stdout or "stood at -0.00°" in again.stdout
+    assert load_configuration(bench.config).drive[joint].zero_turn == pytest.approx(drive.zero_turn, abs=1e-4)
 
 
 def test_a_comment_on_the_key_stays(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

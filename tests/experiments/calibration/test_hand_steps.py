@@ -85,14 +85,15 @@ def test_limits_are_narrowed_for_the_joint_with_the_least_range_on_either_side()
     def ends(front_deg: float, rear_deg: float) -> Entry:
         return {"front_rad": radians(front_deg), "rear_rad": radians(rear_deg), "velocity_scale": 1.04}
 
-    wide = with_changes(CONFIGURATION, {("limits", f"sweep_{end}_deg"): deg for end, deg in STOPS_DEG.items()})
+    limits = {("limits", f"sweep_{end}_deg"): deg for end, deg in STOPS_DEG.items()}
+    wide = with_changes(CONFIGURATION, limits | {("drive", "right_sweep", "zero_turn"): 0.2})
     entries = {
         level_key("left"): {"left_sweep": radians(1.9)},
         level_key("right"): {"right_sweep": radians(-10.0)},
         "left_sweep: ends": ends(90.0, -95.5),
         "right_sweep: ends": ends(75.5, -109.0),
     }
-    zero_turn = wide.drive["right_sweep"].zero_turn - wide.drive["right_sweep"].sign * 10.0 / 360.0
+    zero_turn = 0.2 - wide.drive["right_sweep"].sign * 10.0 / 360.0
     assert hand_changes(wide, entries) == {
         ("drive", "right_sweep", "zero_turn"): pytest.approx(zero_turn, abs=1e-5),
         ("limits", "sweep_min_deg"): -94.0,
