@@ -13,7 +13,7 @@ from drivers.drive import DriveHealth
 from drivers.drive_axis import DriveAxis
 
 RESTART_SILENCE_S = 0.3
-MOST_UNANSWERED = 4  # questions; more were lost, and a second drive's answers must not be taken for theirs
+MOST_UNANSWERED = 16  # questions, 40 ms of late answers; more were lost, and a second drive's are not taken for theirs
 SURPLUS_ANSWERS = 8  # in a row, none SURPLUS_S apart: a second drive
 SURPLUS_S = 1.0
 

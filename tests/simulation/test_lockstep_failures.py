@@ -8,8 +8,10 @@ from control.records import Phase
 from drivers.can.mock_bus import MockPort
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from simulation.body.plant import END_STOPS_RAD
 from simulation.devices.motion_capture import SimulatedPose
+from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -38,6 +40,19 @@ def test_a_stalled_loop_misses_ticks_while_the_robot_continues(lockstep: Lockste
     lockstep.fail("loop", "stuck")
     lockstep.step()
     assert lockstep.loop.missed_ticks == lockstep.tick_number - ticks - 1 == 11
+
+
+@pytest.mark.parametrize("drive", ["moteus", "mit"])
+def test_answers_that_are_late_are_not_those_of_a_second_drive(example_text: str, drive: str) -> None:
+    configuration = parse_configuration(with_drive_type(example_text, drive))
+    lockstep = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
+    lockstep.arm(forced="uncalibrated")
+    lockstep.fail("left_sweep", "slow", 1.0)
+    seen: set[str] = set()
+    for _ in range(400):
+        lockstep.step()
+        seen |= {fault.name for fault in lockstep.loop.faults.present}
+    assert "drive_late" in seen and "duplicate_node_id" not in seen
 
 
 def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(lockstep: Lockstep) -> None:
