@@ -3,7 +3,7 @@
 import signal
 import subprocess
 import sys
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
@@ -17,6 +17,7 @@ from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
 from firmware_host.log.log_folder import DONE
+from firmware_host.sockets.status_socket import MOST_OPERATORS
 from firmware_host.ticker import Tick
 from logs.files.log_reader import read_log
 from operator_client.status_client import StatusClient
@@ -25,7 +26,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.firmware_host.sockets.served_socket import Served
-from tests.waiting import LONGEST_S
+from tests.waiting import LONGEST_S, wait_until
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 
@@ -158,18 +159,27 @@ def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
     served.close()
 
 
-def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(short_folder: Path) -> None:
+def test_a_daemon_prints_where_it_is_operated_and_protects_a_lease_until_its_holder_leaves(short_folder: Path) -> None:
     """It does so even if no drive sends anything."""
     setup = write_local_setup(short_folder, short_folder / "logs")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(setup)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as daemon:
         assert daemon.stdout is not None
         line = daemon.stdout.readline()
-        with closing(StatusClient(short_folder / "mudskipper.sock")) as client:
-            warnings = client.call("status")["warnings"]
-        daemon.send_signal(signal.SIGTERM)
+        try:
+            with ExitStack() as others, closing(StatusClient(short_folder / "mudskipper.sock")) as client:
+                client.call("lease", for_s=10.0)
+                for _ in range(MOST_OPERATORS):  # one of these makes room
+                    others.enter_context(StatusClient(short_folder / "mudskipper.sock")).call("hello")
+                warnings = client.call("status")["warnings"]
+            with closing(StatusClient(short_folder / "mudskipper.sock")) as client:
+                wait_until(lambda: client.call("status")["lease"] is None)
+        finally:
+            daemon.send_signal(signal.SIGTERM)
         assert daemon.wait(LONGEST_S) == 0
     assert warnings[0].startswith("protection is weakened (")
     (log,) = (short_folder / "logs" / DONE).glob("*.mcap")
-    assert f"warning: {warnings[0]}" in [event["text"] for event in read_log(log).events]
+    stamp_of = {event["text"].partition(" uid")[0]: event["stamp_s"] for event in read_log(log).events}
+    assert f"warning: {warnings[0]}" in stamp_of
+    assert stamp_of["lease of"] - stamp_of["lease taken by"] < 9.0
     assert "ready" in line and str(short_folder / "mudskipper.sock") in line

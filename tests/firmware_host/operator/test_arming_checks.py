@@ -1,6 +1,6 @@
 """The list of `mudskipper check` fails in exactly the lines whose faults block arming."""
 
-from math import nan
+from math import degrees, nan
 from struct import pack
 from typing import Any
 
@@ -46,7 +46,8 @@ def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep) -> None:
     assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint", "watchdog") for joint in JOINTS}
     assert lines["log"]["text"] == "off"
     assert "firmware 0.6.11" in lines["drive.left_sweep"]["text"]
-    assert "30 degrees C" in lines["joint.left_sweep"]["text"]
+    at_deg = degrees(ready.loop.states[0].angle_rad)
+    assert lines["joint.left_sweep"]["text"] == f"at {at_deg:.1f} degrees, 30 degrees C"
     assert lines["watchdog.left_sweep"]["text"] == "trips after 0.1 s"
     assert "380" in lines["loop"]["text"]
 

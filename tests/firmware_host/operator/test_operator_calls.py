@@ -188,6 +188,14 @@ def test_a_lease_that_ends_with_torque_off_does_not_block_arming(robot: Robot, e
     assert robot.ask("status")["mode"] == "hold"
 
 
+def test_a_program_that_ends_right_after_its_request_to_arm_arms_nothing(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    robot.ask("arm", lease_s=0.5)
+    robot.lease.hang_up(ANNA)
+    robot.steps.run_for(0.2)
+    assert robot.ask("status")["mode"] == "idle" and not robot.events.about("mode idle to arming")
+
+
 def test_an_operator_resets_no_timing_while_another_user_holds_the_lease(armed: Robot) -> None:
     armed.ask("lease", for_s=0.5)
     with pytest.raises(RefusedError, match="uid 1000 .* operates the robot"):

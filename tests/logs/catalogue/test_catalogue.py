@@ -132,6 +132,13 @@ def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
     assert (entry.state, entry.run) == ("whole", "other") and entry.duration_s is not None
 
 
+def test_two_logs_of_one_name_are_two_entries(folder: Path) -> None:
+    log = LogFile(folder / "walk.mcap", OPENING)
+    log.write(make_ticks(0, 39))
+    log.finish()
+    assert {"walk.mcap", f"{DONE}/walk.mcap"} <= updated(folder).keys()
+
+
 def test_a_log_that_is_still_being_copied_is_no_entry(folder: Path) -> None:
     (folder / DONE / ".partial").mkdir()
     for name in (".partial/next.mcap", ".next.mcap"):
