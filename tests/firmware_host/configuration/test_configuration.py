@@ -55,6 +55,9 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("[bus.left]", "[bus.left]\noptions = { a = [1] }", [
         f"bus.left.options.a = [1]: should be a valid {kind}" for kind in ("string", "integer", "number", "boolean")
     ]),
+    ("[adaptation]", '[adaptation]\nmethod = "gait"\ngait = { max_sweep_deg = 60.0 }', [
+        "adaptation.gait.max_sweep_deg = 60.0: reaches 0.0130 m, less than adaptation.min_depth_m = 0.015"
+    ]),
     ("torque_nm = 0.75", "torque_nm = 0.75\nsweep_min_deg = -25.0", [
         "limits.sweep_min_deg = -25.0: must be at most -30"
     ]),
@@ -193,6 +196,18 @@ def test_drives_share_neither_a_missing_bus_nor_an_id() -> None:
     assert problems_of(f"{last}[bus.a.options]\n{options[0]}\n[bus.b.options]\n{options[1]}\n") == shared
     other_frames = problems_of(last.replace("[bus.b]", "[bus.b]\ndata_bit_rate_kbit_s = 5000") + 'type = "moteus"\n')
     assert any("disturbs drive.left_sweep (odrive) on the same channel 'x'" in problem for problem in other_frames)
+
+
+@pytest.mark.parametrize(
+    ("bus", "problem"),
+    [
+        ('"virtual"', "data_bit_rate_kbit_s = 0: must be that of drive.left_sweep (moteus), which uses CAN FD"),
+        ('"slcan"\ndata_bit_rate_kbit_s = 5000', "interface = 'slcan': carries no CAN FD, which drive.left_sweep"),
+    ],
+)
+def test_a_bus_carries_the_can_fd_of_its_drives(bus: str, problem: str) -> None:
+    text = re.sub(r"node_id = (\d)", r'node_id = 1\1\ntype = "moteus"', minimal_text()).replace('"virtual"', bus)
+    assert [each.startswith(f"bus.a.{problem}") for each in problems_of(text)] == [True]
 
 
 @pytest.mark.parametrize(

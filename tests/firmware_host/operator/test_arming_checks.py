@@ -1,6 +1,6 @@
 """The list of `mudskipper check` fails in exactly the lines whose faults block arming."""
 
-from math import degrees, nan
+from math import nan
 from struct import pack
 from typing import Any
 
@@ -8,7 +8,7 @@ import pytest
 
 from control.faults import FAULT_KINDS, OVERRULED_BY_FORCE, Blocks, FaultKind, Reaction
 from control.modes import Mode, Request
-from control.records import JOINTS
+from control.records import JOINTS, Joints
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.sockets.socket_methods import METHODS
@@ -39,15 +39,15 @@ def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> di
     return lines
 
 
-def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep) -> None:
+def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ready.loop, "states", Joints(*(state._replace(angle_rad=0.5) for state in ready.loop.states)))
     lines = lines_of(ready)
     assert all(item["ok"] and not item["fix"] for item in lines.values())
     expected = {"configuration", "loop", "log", "bus.left", "bus.right"}
     assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint", "watchdog") for joint in JOINTS}
     assert lines["log"]["text"] == "off"
     assert "firmware 0.6.11" in lines["drive.left_sweep"]["text"]
-    at_deg = degrees(ready.loop.states[0].angle_rad)
-    assert lines["joint.left_sweep"]["text"] == f"at {at_deg:.1f} degrees, 30 degrees C"
+    assert lines["joint.left_sweep"]["text"] == "at 28.6 degrees, 30 degrees C"
     assert lines["watchdog.left_sweep"]["text"] == "trips after 0.1 s"
     assert "380" in lines["loop"]["text"]
 
