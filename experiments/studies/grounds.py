@@ -19,7 +19,8 @@ from pandas import DataFrame
 from estimation.estimation_parameters import EstimationParameters
 from experiments.reports.coefficient_table import compared_frame
 from experiments.reports.error_table import error_frame
-from experiments.reports.mud_styles import LINES
+from experiments.reports.mud_styles import LINES, MARKS
+from experiments.reports.style import INK
 from experiments.studies.estimation import ENDLESS_M, SETUPS, STRIDES
 from experiments.studies.sweep import METHOD_STRIDES, Summary, sweep_of, sweep_row
 from experiments.study.option import Option
@@ -54,7 +55,7 @@ GROUNDS: Mapping[str, Ground] = {
     "sand-spatial": Sand("sand", 1.55e6, spatial=True),
 }
 
-SPEEDS = "Lines: speed at constant depths. Large dots: speed of the robot's own choice, at the median of its depths."
+SPEEDS = "Lines: speed at constant depths. Large marks: speed of the robot's own choice, at the median of its depths."
 
 
 def study(
@@ -124,14 +125,15 @@ def estimate(ground: str, setup: str, seed: int) -> dict[str, Any]:
 
 
 def draw(swept: Mapping[str, Summary]) -> Drawing:
-    """Draw speed over depth for each ground, and where the robot's own choice lies."""
+    """Draw speed over depth for each ground, and where the robot's own choice lies; each has its own line and mark."""
     figure = Drawing()
     panel = figure.subplots()
     for n, (name, own) in enumerate(swept.items()):
-        look: dict[str, Any] = {"color": f"C{n}", "linestyle": LINES[n % len(LINES)], "linewidth": 1.2}
-        panel.plot("depth_cm", "mean", data=DataFrame(own["constant"]), marker=".", label=name, **look)
+        look: dict[str, Any] = {"color": f"C{n}", "marker": MARKS[(n + n // len(LINES)) % len(MARKS)]}
+        line = {"linestyle": LINES[n % len(LINES)], "linewidth": 1.2, "markersize": 3.5}
+        panel.plot("depth_cm", "mean", data=DataFrame(own["constant"]), label=name, **look, **line)
         for chosen in own["methods"].values():
-            panel.plot(chosen["depth_cm"], chosen["mean"], "o", color=f"C{n}")
-    panel.set(xlabel="depth (cm); dots: chosen by the robot", ylabel="speed (cm/s)")
+            panel.plot(chosen["depth_cm"], chosen["mean"], markersize=9.0, markeredgecolor=INK, **look)
+    panel.set(xlabel="depth (cm); large marks: chosen by the robot", ylabel="speed (cm/s)")
     panel.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure

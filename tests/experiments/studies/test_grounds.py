@@ -9,7 +9,7 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from estimation.ground_law import law_of_strides
 from experiments.robot.lockstep_robot import start_walk
-from experiments.studies.grounds import GROUNDS, disturbances_on, study
+from experiments.studies.grounds import GROUNDS, disturbances_on, draw, study
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.trial import WALKING, configuration_of
 from simulation.mud.disturbances import TRACKWAY
@@ -70,3 +70,10 @@ def test_five_strides_name_the_law_of_a_ground(ground: str, law: str) -> None:
     strides = [closed.estimate for closed in robot.loop.learning.strides]
     evidence = law_of_strides(configuration.geometry, strides)
     assert evidence is not None and evidence.name == law
+
+
+def test_the_grounds_of_the_picture_differ_without_their_colours() -> None:
+    point = {"depth_cm": 3.0, "mean": 4.0}
+    (panel,) = draw({name: {"constant": [point], "methods": {"default": point}} for name in GROUNDS}).axes
+    lines = panel.get_lines()[::2]
+    assert len({(line.get_linestyle(), line.get_marker()) for line in lines}) == len(lines) == len(GROUNDS)
