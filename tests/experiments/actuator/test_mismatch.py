@@ -1,5 +1,7 @@
 """A reading of a weight other than the requested one is detected."""
 
+from dataclasses import replace
+
 import pytest
 
 from experiments.actuator.mismatch import find_mismatch
@@ -47,3 +49,16 @@ def test_an_arm_that_is_not_empty_is_reported() -> None:
     step = WeighingStep(1, 0.0)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(100.0), CONFIGURED_NM_A)
     assert mismatch is not None and "should be empty" in mismatch[0]
+
+
+def test_a_weight_that_slipped_off_is_reported() -> None:
+    step = WeighingStep(2, 400.0)
+    mismatch = find_mismatch(PLAN, before(step), step, current_a(40.0), CONFIGURED_NM_A)
+    assert mismatch is not None and mismatch[1] is None and "not 400 g: did it slip off?" in mismatch[0]
+
+
+@pytest.mark.parametrize("trusts", [True, False])
+def test_a_first_weight_is_compared_with_the_configured_constant_only_where_that_is_trusted(trusts: bool) -> None:
+    step = WeighingStep(1, 10.0)
+    plan = replace(PLAN, trusts_constant=trusts)
+    assert bool(find_mismatch(plan, before(step), step, current_a(400.0), CONFIGURED_NM_A)) is trusts

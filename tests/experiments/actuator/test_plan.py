@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.actuator.plan import WeighingPlan, require_possible, steps_of
+from experiments.actuator.plan import WeighingPlan, require_possible, stays_cool, steps_of
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
@@ -36,3 +36,8 @@ def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
     hot = replace(configuration, winding=replace(configuration.winding, thermal_resistance_k_w=4.0))
     with pytest.raises(BenchError, match=r"winding.thermal_resistance_k_w = 4: 800 g would warm the winding of left_"):
         require_possible(WeighingPlan(("left_sweep",)), hot)
+
+
+def test_a_winding_must_stay_below_the_temperature_at_which_torque_fades(configuration: Configuration) -> None:
+    warm_c = configuration.limits.temperature_warm_c
+    assert [stays_cool(configuration, 0.0, warm_c - below_k, 0.0) for below_k in (1.9, 2.1)] == [False, True]
