@@ -136,12 +136,16 @@ def test_a_computer_without_a_configuration_has_none_to_refuse(computer: Compute
 @pytest.mark.parametrize("mode", ["", *(mode.name.lower() for mode in Mode)])
 def test_the_package_refuses_in_the_same_modes(mode: str, tmp_path: Path) -> None:
     """The scripts of the package also protect an upgrade by apt or dpkg alone; a broken program prevents none."""
-    answer = f"#!/bin/sh\necho '{json.dumps({'mode': mode})}'" if mode else "#!/none"
+    answers = f"test $MUDSKIPPER_SOCKET = own.sock && echo '{json.dumps({'mode': mode})}'"
+    answer = f"#!/bin/sh\n{answers}" if mode else "#!/none"
+    (tmp_path / "mudskipper.toml").write_text('[status]\nsocket = "own.sock"\n', encoding="utf-8")
     for name, text in (("mudskipper", answer), ("systemctl", "#!/bin/sh\nexit 3")):  # no service is active
         (tmp_path / name).write_text(text, encoding="utf-8")
         (tmp_path / name).chmod(0o755)
     path = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    script = (ROOT / "debian" / "prerm").read_text(encoding="utf-8").replace("/opt/mudskipper/venv/bin", str(tmp_path))
+    script = (ROOT / "debian" / "prerm").read_text(encoding="utf-8")
+    for folder in ("/opt/mudskipper/venv/bin", "/etc/mudskipper"):
+        script = script.replace(folder, str(tmp_path))
     command = ["sh", "-c", script, "prerm", "upgrade"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False, env=path)
     refuses = mode in {each.name.lower() for each in ENERGISED}
