@@ -52,6 +52,10 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("torque_nm = 0.75", "torqe_nm = 0.5", ["limits.torqe_nm: there is no such key"]),
     ("torque_nm = 0.75", "torque_nm = 9.5", ["limits.torque_nm = 9.5: must be at most 5.0"]),
     ("torque_nm = 0.75", "torque_nm = nan", ["limits.torque_nm = "]),
+    ("torque_nm = 0.75", 'torque_nm = "0.75"', ["limits.torque_nm = '0.75': should be a valid number"]),
+    ("[status]", '[pose]\nsource = "rail_encoder"\nrail_encoder = { device = "/dev/ttyACM0" }\n[status]', [
+        "pose.rail_encoder.metres_per_count = 0.0: must be given"
+    ]),
     ("[bus.left]", "[bus.left]\noptions = { a = [1] }", [
         f"bus.left.options.a = [1]: should be a valid {kind}" for kind in ("string", "integer", "number", "boolean")
     ]),

@@ -20,7 +20,7 @@ from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import METHODS, Level
-from firmware_host.trial import BEGUN, OperatorReport, from_json, read_report
+from firmware_host.trial import BEGUN, SET, OperatorReport, from_json, read_report
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -136,6 +136,16 @@ def test_a_described_walk_is_a_trial_and_so_is_the_walk_after_it(armed: Robot) -
     with pytest.raises(RefusedError):
         walk(mud="B", depth_m=1.0)
     assert armed.ask("status")["trial"] == {}
+
+
+def test_new_defaults_go_to_the_log_whose_writer_stores_them(robot: Robot) -> None:
+    robot.ask("trial_set", mud="A")
+    report = read_report(robot.events.texts[-1])
+    assert report and (report.kind, from_json(report.text)) == (SET, {"mud": "A"})
+
+
+def test_a_status_has_the_age_of_each_position(armed: Robot) -> None:
+    assert all(0.0 <= drive["angle_age_s"] < 0.1 for drive in armed.ask("status")["drives"])
 
 
 @pytest.mark.parametrize("method", ["note", "mark"])
