@@ -75,7 +75,7 @@ class Run:
         self.outcome.covered[f"drives {self._scenario.surroundings.drive_type}"] += 1
         waiting = list(self._scenario.events)
         end_s = self._begun_s + self._scenario.for_s
-        while self._robot.now_s < end_s:
+        while waiting or self._robot.now_s < end_s:  # a process that was stopped may resume after the end
             while waiting and waiting[0].at_s <= self._robot.now_s - self._begun_s:
                 event = waiting.pop(0)
                 self._robot.apply(event)

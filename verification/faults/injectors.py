@@ -250,7 +250,7 @@ def moved_at_speed(robot: FailingRobot, joint: str, velocity_rad_s: float) -> It
 def jammed(robot: FailingRobot, joint: str) -> Iterator[None]:
     """Block a joint where it is."""
     arm, inertia = robot.arm_of(joint), f"{_axis(joint)}_inertia_kg_m2"
-    before_kg_m2 = getattr(arm.parameters.arm_mass, inertia)
+    free_kg_m2 = getattr(robot.robot.plant.parameters.arm_mass, inertia)  # also where the arm is blocked twice
 
     def set_inertia(value_kg_m2: float) -> None:
         arm_mass = replace(arm.parameters.arm_mass, **{inertia: value_kg_m2})
@@ -259,7 +259,7 @@ def jammed(robot: FailingRobot, joint: str) -> Iterator[None]:
     set_inertia(BLOCKED_KG_M2)
     _move(robot, joint, _angle_rad(robot, joint))
     yield
-    set_inertia(before_kg_m2)
+    set_inertia(free_kg_m2)
 
 
 @during
