@@ -263,7 +263,7 @@ class FaultKind(StrEnum):
     # joints and motors
     JOINT_POSITION = (
         "joint_position", "joint", DAMPING, ALWAYS, BY_HAND, 3,
-        "A joint is outside of its range and its margin, or full torque does not bring it back for 0.3 s.",
+        "A joint is outside of its range and its margin, or of its range for 0.3 s at 30 % of its torque or more.",
         "The {subject} joint is at {angle_deg:.1f} degrees, outside of {low_deg:.0f} to {high_deg:.0f}.",
         "move it back by hand, then 'mudskipper clear'",
     )

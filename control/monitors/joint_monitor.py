@@ -30,7 +30,8 @@ STILL_RAD = 0.03
 REST_S = 0.1  # within STILL_RAD: the joint is at rest
 SATURATED_FRACTION = 0.95  # of the torque limit
 STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the paper's gait takes
-RETURNING_S = 0.3  # at full torque back into the range: a motor that turns the wrong way presses against the stop there
+RETURNING_FRACTION = 0.3  # of the torque limit, on a joint at rest beyond its range
+RETURNING_S = 0.3  # then: a motor that turns the wrong way presses against the stop there
 MISSING_FRACTION = 0.3  # of the torque limit: difference between commanded and measured torque
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # two messages at an interval of 0.1 s: a single outlier is no fault
@@ -78,6 +79,7 @@ class JointMonitor:
         self._constant_nm_a = torque_constant_nm_a
         self._heartbeat_silence_s = MISSING_HEARTBEATS * heartbeat_period_s
         self._missing_nm = MISSING_FRACTION * limits.torque_nm
+        self._returning_nm = RETURNING_FRACTION * limits.torque_nm
         self._saturated_nm = SATURATED_FRACTION * limits.torque_nm
         self._nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0  # half of the torque is left
         self.reset()
@@ -103,7 +105,7 @@ class JointMonitor:
         self._watch_drive(found, facts, seen_s, state)
         self._watch_range(found, seen_s, state)
         self._watch_motion(found, facts, seen_s, state, torque_nm, target)
-        self._watch_load(found, facts, seen_s, state.current_a, torque_nm)
+        self._watch_load(found, facts, seen_s, state, torque_nm)
         self._watch_heat(found, facts, state, torque_nm)
         return found
 
@@ -111,7 +113,7 @@ class JointMonitor:
         """Return the faults of a tick that mud causes where drive, encoder and wires cannot fail."""
         found: list[Fault] = []
         self._watch_range(found, facts.dt_s, state)
-        self._watch_load(found, facts, facts.dt_s, state.current_a, torque_nm)
+        self._watch_load(found, facts, facts.dt_s, state, torque_nm)
         self._watch_heat(found, facts, state, torque_nm)
         return found
 
@@ -242,8 +244,9 @@ class JointMonitor:
     # load
 
     def _watch_load(
-        self, found: list[Fault], facts: TickFacts, seen_s: float, current_a: float, torque_nm: float
+        self, found: list[Fault], facts: TickFacts, seen_s: float, state: DriveState, torque_nm: float
     ) -> None:
+        current_a = state.current_a
         self._current_ticks = self._current_ticks + 1 if abs(current_a) > self._most_a else 0
         if self._current_ticks >= CURRENT_TICKS:
             found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
@@ -253,7 +256,9 @@ class JointMonitor:
         if self._missing_s > MISSING_S:  # a frozen current, lost commands, a silent clamp
             kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
             found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
-        pushed = abs(torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
+        in_range = self._span.min_rad <= state.angle_rad <= self._span.max_rad
+        least_nm = self._saturated_nm if in_range else self._returning_nm
+        pushed = abs(torque_nm) >= least_nm > 0.0 and not facts.may_stand_still
         self._stalled_s = self._stalled_s + seen_s if pushed else 0.0
         if self._stalled_s > STALLED_S:
             found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))

@@ -84,12 +84,23 @@ def test_a_fault_begins_in_its_tick(name: str, state: Changes, tick: Changes, ti
     assert ticks <= FAULT_KINDS[name].bound_ticks
 
 
-@pytest.mark.parametrize(("angle_deg", "found_after"), [(60.1, 114), (-69.9, 114), (60.0, None), (-60.0, None)])
-def test_a_joint_that_full_torque_does_not_bring_back_is_outside_of_its_range(
-    angle_deg: float, found_after: int | None
+@pytest.mark.parametrize(
+    ("angle_deg", "torque_nm", "found_after"),
+    [
+        (60.1, FULL_NM, 114),
+        (-69.9, FULL_NM, 114),
+        (60.1, 0.226, 114),  # three tenths of the limit
+        (60.1, 0.224, None),
+        (60.0, FULL_NM, None),
+        (-60.0, FULL_NM, None),
+    ],
+)
+def test_a_joint_that_a_lasting_torque_does_not_bring_back_is_outside_of_its_range(
+    angle_deg: float, torque_nm: float, found_after: int | None
 ) -> None:
     monitor, state = make_monitor(), healthy(angle_rad=radians(angle_deg), current_a=9.0)
-    found = ["joint_position" in names_of(monitor, state, torque_nm=-copysign(FULL_NM, angle_deg)) for _ in range(700)]
+    back_nm = -copysign(torque_nm, angle_deg)
+    found = ["joint_position" in names_of(monitor, state, torque_nm=back_nm) for _ in range(700)]
     assert found == [found_after is not None and tick >= found_after for tick in range(700)]
 
 
