@@ -8,6 +8,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  Mud and friction only take energy, so E falls; what a joint returns while it is braked it received
                  before. E rises without end where the torque is inverted or another's. Here it leaks within 0.2 s and
                  never is below zero: a weight that the motor lowers at the speed of a path stays below the bound.
+                 Where the target rests, and in damping, it leaks within 1 s, since a joint that a strong motor shakes
+                 gains little in a cycle.
     oscillation  the path away from the target: |Δθ| - |Δθ*| + Δ|θ* - θ| is zero for a joint that approaches its
                  target, lags behind it or stands still, and twice the path of one that moves away. A loop that is not
                  stable moves away twice in each of its cycles. It leaks within 0.3 s. A joint that shoots past its
@@ -45,6 +47,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
 
 RUNAWAY_RAD = 0.2  # path of full torque whose energy may remain unexplained: twice that of rocking in the stiffest mud
 RUNAWAY_LEAK_S = 0.2  # full torque that lowers a weight at 1 rad/s, the speed of a path, stays within the bound
+RESTING_LEAK_S = 1.0  # where no path lowers a weight: the target rests, or the joint is braked
 RUNAWAY_FLOOR_J = 0.02  # noise of the speed, and a hand, where the torque limit is low
 AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
@@ -165,7 +168,8 @@ class MotionMonitor:
         else:
             self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
-        unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
+        leak_s = RESTING_LEAK_S if braked or target_step_rad == 0.0 else RUNAWAY_LEAK_S
+        unexplained_j = (1.0 - elapsed_s / leak_s) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
         if self._punctual_s < SETTLING_S:
             self.away_rad = self._excursion_rad = self._excursion_before_rad = self._same_side_rad = 0.0
