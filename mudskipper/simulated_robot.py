@@ -25,6 +25,7 @@ def simulate(world: World | None = None, robot: str | Path | None = None, seed: 
     `world` is a Ground, a world file or its tables (default: three muds), `robot` the configuration of a robot, without
     its buses and logs. Everything is in a temporary folder. Raises ConfigurationError and NoDaemonError.
 
+    >>> from mudskipper import Ground, simulate
     >>> with simulate(Ground(strength_pa=500.0)) as client:
     ...     client.arm()
     ...     client.wait_for("hold")["mode"]

@@ -7,7 +7,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.calibration.robots import CalibratedRobot
+from experiments.studies import calibrate
 from firmware_host.configuration.loading import load_configuration
 from tests.experiments.calibration.test_calibration import TRUE_NM_A, WeighedRobot
 
@@ -19,7 +19,7 @@ COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
 def test_one_command_finds_what_a_simulated_robot_was_built_with(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(CalibratedRobot, "weigh", WeighedRobot.weigh)  # without the minutes of the weights
+    monkeypatch.setattr(calibrate, "CalibratedRobot", WeighedRobot)  # without the minutes of the weights
     command = [*COMMAND, "--operator", "Ada", "--out", str(tmp_path)]
     assert main([*command, "--json"]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)

@@ -11,6 +11,7 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration, StatusParameters
+from firmware_host.log.recorder import NullRecorder
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
@@ -27,7 +28,7 @@ SLEEP_S = 0.002
 
 def resting_robot(configuration: Configuration, failures: Failures | None = None) -> Lockstep:
     track = Track([(0.35, MUDS["48.5"]), (5.0, MUDS["53.1"])])
-    return Lockstep(configuration, track, failures=failures)
+    return Lockstep(configuration, track, failures=failures, recorder=NullRecorder())
 
 
 def walking_robot(configuration: Configuration, failures: Failures | None = None) -> Lockstep:
