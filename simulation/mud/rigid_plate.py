@@ -99,7 +99,9 @@ def along(vector: Vector, factor: float) -> Vector:
 
 
 def added(*vectors: Vector) -> Vector:
-    x, y, z = map(sum, zip(*vectors, strict=True))
+    x = y = z = 0.0
+    for vector in vectors:
+        x, y, z = x + vector[0], y + vector[1], z + vector[2]
     return x, y, z
 
 

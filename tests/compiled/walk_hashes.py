@@ -13,7 +13,9 @@ from firmware_host.log.recorder import NullRecorder
 from firmware_host.software_version import is_compiled
 from simulation.harness.drive_presets import DRIVES
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.track import paper_track
+from simulation.mud.clay import MUDS
+from simulation.mud.stones import Stone
+from simulation.mud.track import Track, paper_track
 from verification.example_robot import load_example, load_one_flipper
 
 STRIDES = 4
@@ -31,9 +33,9 @@ class HashingRecorder(NullRecorder):
         return True
 
 
-def walk_hashes(configuration: Configuration) -> dict[str, object]:
+def walk_hashes(configuration: Configuration, track: Track | None = None) -> dict[str, object]:
     recorder = HashingRecorder()
-    robot = Lockstep(configuration, paper_track(), recorder=recorder)
+    robot = Lockstep(configuration, track or paper_track(), recorder=recorder)
     listeners, digest, frames = [bus.open() for bus in robot.buses.values()], sha256(), 0
     robot.arm(forced="watchdog_unknown")  # a MIT drive cannot report its watchdog
     robot.walk(WalkOrder(0.03, adaptive=True, strides=STRIDES))
@@ -50,4 +52,6 @@ def walk_hashes(configuration: Configuration) -> dict[str, object]:
 
 if __name__ == "__main__":
     walks = {drive: walk_hashes(load_example(drive)) for drive in DRIVES}
-    print(json.dumps({"compiled": is_compiled(), "walks": walks | {"one flipper": walk_hashes(load_one_flipper())}}))
+    walks["one flipper"] = walk_hashes(load_one_flipper())
+    walks["over a stone"] = walk_hashes(load_example(), Track([(5.0, MUDS["48.5"])], [Stone(0.05, 0.25, 0.02)]))
+    print(json.dumps({"compiled": is_compiled(), "walks": walks}))
