@@ -45,8 +45,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave what the tests and libraries consist of out of every collection of garbage: it is a million objects."""
+    """Leave what the tests and libraries consist of out of every collection of garbage, a million objects, and collect
+    rarely: a simulated walk makes many records and few cycles.
+    """
     gc.freeze()
+    gc.set_threshold(20_000)
 
 
 @pytest.fixture(scope="session")
