@@ -49,7 +49,7 @@ def pytest_collection_finish() -> None:
     rarely: a simulated walk makes many records and few cycles.
     """
     gc.freeze()
-    gc.set_threshold(20_000)
+    gc.set_threshold(100_000)
 
 
 @pytest.fixture(scope="session")
