@@ -49,7 +49,7 @@ class Loop:
         period_s: float = PERIOD_S,
         power_switch: PowerSwitch | None = None,
     ) -> None:
-        """`recorder`: None where nobody reads the rows, so that none is made."""
+        """`recorder`: None where no program reads the rows, so that none is made."""
         self.period_s = period_s
         self.configuration = configuration
         self.drives = drives

@@ -49,7 +49,7 @@ def test_a_jump_leaves_a_read_without_a_pose(port: PosePort, sender: PoseSender)
         assert isnan(port.read(1.0 + 0.01 * source_s).x_m) == (x_m == 0.14)
 
 
-def test_a_bridge_of_an_operator_may_send_and_nobody_else(port: PosePort, path: Path) -> None:
+def test_a_bridge_of_an_operator_may_send_and_no_other_user(port: PosePort, path: Path) -> None:
     assert path.stat().st_mode & 0o777 == 0o660
 
 
