@@ -41,8 +41,8 @@ from simulation.mud.carriage import Carriage, plate_directions
 from simulation.mud.clay import UNIT_WEIGHT_N_M3
 from simulation.mud.flipper_contact import NO_CONTACT
 from simulation.mud.ground_contact import Ground
-from simulation.mud.rigid_plate import Vector, cross, dot
 from simulation.mud.track import Track
+from simulation.mud.vectors import Vector, cross, dot
 
 YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
 LARGEST_RAD_S = 600.0  # the fastest ringing of the body on its belly that steps of 1 ms resolve

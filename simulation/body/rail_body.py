@@ -12,8 +12,8 @@ from control.records import TWO_FLIPPERS, Rig
 from simulation.mud.carriage import Carriage
 from simulation.mud.flipper_contact import ContactForce
 from simulation.mud.ground_contact import Ground
-from simulation.mud.rigid_plate import Vector
 from simulation.mud.track import Track
+from simulation.mud.vectors import Vector
 
 DRAG_STIFFNESS_N_M = 5000.0
 DRAG_DAMPING_N_S_M = 71.0

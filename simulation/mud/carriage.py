@@ -14,7 +14,8 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from simulation.mud.rigid_plate import Attitude, Twist, Vector, dot
+from simulation.mud.rigid_plate import Attitude, Twist
+from simulation.mud.vectors import Vector, dot
 
 LEAST_UPRIGHT = 0.05  # a plate cannot lie flat: its strips would be endless
 

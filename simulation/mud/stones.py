@@ -22,7 +22,8 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from simulation.mud.rigid_plate import Attitude, Wrench, added, along, horizontal
+from simulation.mud.rigid_plate import Attitude, Wrench
+from simulation.mud.vectors import added, along, horizontal
 
 STIFFNESS_N_M = 20e3
 DAMPING_N_S_M = 15.0

@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import acos, asin, atan2, copysign, cos, hypot, pi, sin
 from typing import NamedTuple
 
-from simulation.mud.rigid_plate import LEVEL, Vector, added, along, cross, dot, horizontal
+from simulation.mud.vectors import LEVEL, Vector, added, along, cross, dot, horizontal
 
 LEAST = 0.02  # of the resistance along the motion: the smallest of the generic map is 0.054
 FRICTION = 0.4  # of the plate on sand, of the order of plastic's

@@ -17,7 +17,8 @@ from math import hypot
 from simulation.mud.ground_contact import GroundContact
 from simulation.mud.grounds.sand import Sand
 from simulation.mud.plate_panels import Corner
-from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Vector, Wrench, added, along, dot
+from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench
+from simulation.mud.vectors import Vector, added, along, dot
 
 YIELD_M = 0.003  # of a flat plate pushed down; a stiffer spring would ask for shorter steps
 Centre = tuple[float, float, float]  # ∫ζ dA, and where its middle is: outward, upward

@@ -11,8 +11,8 @@ from control.geometry import FlipperGeometry
 from simulation.body.free_body import axes_of, own_axes
 from simulation.mud.carriage import Carriage, plate_directions
 from simulation.mud.flipper_contact import attitude_of, contact_force
-from simulation.mud.rigid_plate import added, along
 from simulation.mud.stones import NO_PUSH, STIFFNESS_N_M, Push, Stone, StoneContact, push_wrench
+from simulation.mud.vectors import added, along
 
 DT_S = 0.001
 GEOMETRY = FlipperGeometry()
