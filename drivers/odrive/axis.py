@@ -39,12 +39,16 @@ class OdriveAxis(CanSimpleAxis):
         }
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
-        self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
-        self._receive_state(state, bool(self._error_flags & codec.ERROR_INITIALIZING), now_s)
+        flags, state, _, _ = codec.HEARTBEAT.decode(data)
+        self._set_errors(flags, self.disarm_reason)
+        self._receive_state(state, bool(flags & codec.ERROR_INITIALIZING), now_s)
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
-        self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
-        self._health = None
+        self._set_errors(*codec.GET_ERROR.decode(data))
+
+    def _set_errors(self, flags: int, disarm_reason: int) -> None:
+        if (flags, disarm_reason) != (self._error_flags, self.disarm_reason):
+            self._error_flags, self.disarm_reason, self._health = flags, disarm_reason, None
 
     def _receive_temperature(self, data: bytes, now_s: float) -> None:
         _, self._temperature_c = codec.GET_TEMPERATURE.decode(data)

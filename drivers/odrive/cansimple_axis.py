@@ -117,9 +117,10 @@ class CanSimpleAxis(DriveAxis):
         self._duplicates.on_heartbeat(self._read_s, self._read_before_s)
         self.closed_loop = state == AxisState.CLOSED_LOOP
         self.setpoints.on_heartbeat(self.closed_loop)
-        self.busy_state = 0 if state in QUIET_STATES else state
         self._heartbeat_stamp_s = now_s
-        self._health = None
+        busy_state = 0 if state in QUIET_STATES else state
+        if busy_state != self.busy_state:
+            self.busy_state, self._health = busy_state, None
 
     def _on_silence(self) -> None:
         """Count a restart if all messages were missing, not one of them alone, while this program was reading."""

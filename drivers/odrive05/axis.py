@@ -83,6 +83,7 @@ class Odrive05Axis(CanSimpleAxis):
         if self.closed_loop and state != AxisState.CLOSED_LOOP:
             self._following, self._current_a, self._idle_data = False, 0.0, b""
         self._receive_state(state, False, now_s)
+        self._health = None
         fit = state == AxisState.IDLE and not self._error_flags and not self._following
         self._proof.on_heartbeat(expired, fit, self._read_s, self._read_before_s)
 

@@ -11,7 +11,16 @@ from control.rate import PERIOD_S
 from control.records import Joints
 from drivers.can.frames import Frame
 from drivers.drive import WatchdogEndpoints
-from drivers.odrive.codec import ADDRESS, GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message
+from drivers.odrive.codec import (
+    ADDRESS,
+    GET_ENCODER_ESTIMATES,
+    GET_ERROR,
+    GET_IQ,
+    GET_VERSION,
+    HEARTBEAT,
+    TX_SDO,
+    Message,
+)
 from drivers.odrive.settings import REFRESH_S
 from tests.drivers.odrive.odrive_bench import PARAMETERS, OdriveBench
 
@@ -293,6 +302,18 @@ def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) 
         bench.heartbeat(state)
         bench.read(bench.now_s + 0.1)
         assert bench.axis.health.busy_state == busy
+
+
+def test_errors_are_named_while_they_last_and_the_reason_of_disarming_after_them(bench: Bench) -> None:
+    for message, values, active, errors in (
+        (HEARTBEAT, (0x200, 1, 0, 0), "bus under-voltage", "bus under-voltage"),
+        (GET_ERROR, (0x200, 0x100), "bus under-voltage", "bus over-voltage, bus under-voltage"),
+        (HEARTBEAT, (0, 1, 0, 0), "", "bus over-voltage"),
+        (GET_ERROR, (0, 0), "", ""),
+    ):
+        bench.report(message, *values)
+        bench.read(bench.now_s + 0.1)
+        assert (bench.axis.health.active_errors, bench.axis.health.errors) == (active, errors)
 
 
 @pytest.mark.parametrize(("state", "turns_s", "found"), [(8, 0.0, True), (8, 0.5, True), (1, 0.0, False)])
