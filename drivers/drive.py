@@ -8,7 +8,7 @@ in any mix of protocols. drivers/drive_type.py says what a protocol consists of.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
-from math import ceil
+from math import ceil, inf
 from typing import Annotated, ClassVar, NamedTuple, Protocol
 
 from control.bounds import Bounds, Meaning
@@ -63,6 +63,11 @@ class DriveParameters:
     def asking_ends_torque(self) -> bool:
         """Return whether only a command, which ends the drive's torque, can ask for its signals."""
         return False
+
+    @property
+    def fastest_rad_s(self) -> float:
+        """Return the speed at which the motor's voltage is used up, as far as its protocol tells."""
+        return inf
 
     @property
     def reports_settings(self) -> bool:

@@ -338,6 +338,7 @@ def _gain_monitor(configuration: Configuration) -> TorqueGainMonitor:
                 configuration.arm,
                 [frictions.get(joint, NO_FRICTION) for joint in joints],
                 [drives[joint].answers_only for joint in joints],
+                [drives[joint].fastest_rad_s for joint in joints],
             )
         )
     return TorqueGainMonitor(flippers)

@@ -21,10 +21,10 @@ a belt moves alone, up to three times as easily as its joint, and then hits it: 
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
 cross 1 degree, and without the last three of a stroke, which may end before the hit. What is left may vary too little
 to show a gain, so the single blocks must agree. A sweep that the mud lets go of is thrown through that play, so no
-block counts that is faster than any path. A thrown sweep is braked from the beginning, while mud may still push its
-flipper: it brakes as one with a weak motor would, so a sweep is too weak only if its stroke without these blocks says
-the same. One stride proves a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the
-inertias, which must be as exact.
+block counts that is faster than any path, or nearly as fast as its motor can turn, which then gives no torque. A thrown
+sweep is braked from the beginning, while mud may still push its flipper: it brakes as one with a weak motor would, so a
+sweep is too weak only if its stroke without these blocks says the same. One stride proves a gain beyond a factor of 2,
+three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -34,6 +34,7 @@ adduction joint that catches up in a swing: the pull of mud that lets go falls w
 
 from collections import deque
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 from control.computing.exact_sum import exact_sum
@@ -47,6 +48,7 @@ from control.records import DriveState, DriveStates, Phase, Torques
 BLOCK_TICKS = 4
 SLOW_RAD_S = 0.1  # below it dry friction has any direction
 FAST_RAD_S = 10.0  # of a joint that the mud has let go: faster than its path
+DRIVEN_FRACTION = 0.9  # of the motor's fastest speed, from which on it drives no further
 LEAST_BLOCKS = 7  # of a phase
 LEAST_NM2 = 1e-6  # of Σ u² about the mean: a torque at its limit varies by the rounding of floats
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
@@ -122,8 +124,12 @@ class Stride(NamedTuple):
 class JointStrokes:
     """Owns the sums of one joint: of the stroke under way, of the stride under way, and of the last strides."""
 
-    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction, joins: int) -> None:
+    def __init__(
+        self, joint: str, inertia_kg_m2: float, friction: JointFriction, joins: int, fastest_rad_s: float = inf
+    ) -> None:
+        """`fastest_rad_s`: the speed at which the motor's voltage is used up."""
         self.joint = joint
+        self._fast_rad_s = min(FAST_RAD_S, DRIVEN_FRACTION * fastest_rad_s)
         self.inertia_kg_m2 = inertia_kg_m2
         self.friction = None if friction == NO_FRICTION else friction
         self._joins = joins
@@ -142,7 +148,7 @@ class JointStrokes:
         ):
             self.end_stroke()
             return
-        if max(abs(first_rad_s), abs(last_rad_s)) > FAST_RAD_S:
+        if max(abs(first_rad_s), abs(last_rad_s)) > self._fast_rad_s:
             self._clear_stroke()
             return
         if elapsed_s <= 0.0:
@@ -198,13 +204,15 @@ class FlipperStrokes:
         mass: ArmMass,
         frictions: Sequence[JointFriction],
         asked: Sequence[bool],
+        fastest_rad_s: Sequence[float] = (inf, inf),
     ) -> None:
         """`first`: of the flipper's joints among all. `asked`: of each, whether its drive answers only when asked."""
         self._first = self._watched = first
         self._geometry, self._mass = geometry, mass
         self._commands = [slice(0, BLOCK_TICKS) if each else slice(1, BLOCK_TICKS + 1) for each in asked]
         inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
-        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, (JOINED_BLOCKS, 1))
+        joins = (JOINED_BLOCKS, 1)
+        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, joins, fastest_rad_s)
         self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
         self._joint: JointStrokes | None = None  # that this phase watches
         self._swung_in_air = False

@@ -56,6 +56,10 @@ class MitParameters(DriveParameters):
         return True
 
     @property
+    def fastest_rad_s(self) -> float:
+        return self.ranges.velocity_rad_s
+
+    @property
     def reports_settings(self) -> bool:
         return self.ranges.has_registers
 

@@ -418,4 +418,26 @@ REGRESSIONS = (
             for_s=0.8,
         ),
     ),
+    Regression(
+        "the mud throws a sweep to the speed at which its motor's voltage is used up, which looked like a weak motor",
+        Scenario(
+            seed=9743012,
+            surroundings=Surroundings(
+                seed=608938,
+                strength_pa=2135,
+                depth_m=0.031,
+                free_body=True,
+                drive_type="mit:DM4340P",
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.0),
+                    ("gait.swing_duration_s", 0.4),
+                    ("limits.torque_nm", 0.6),
+                    ("adaptation.motor_force_n", 5.0),
+                ),
+            ),
+            start="hold",
+            events=(Call(at_s=0.0, client="pilot", method="walk"),),
+            for_s=1.6,
+        ),
+    ),
 )

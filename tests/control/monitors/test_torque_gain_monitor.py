@@ -1,6 +1,6 @@
 """Moments of torque and motion show a wrong gain only where the torque varied and the motion follows it."""
 
-from math import sin
+from math import inf, sin
 
 import pytest
 
@@ -25,9 +25,9 @@ from control.records import DriveState, Joints, Phase
 INERTIA_KG_M2 = 0.0004
 
 
-def stride_of(speeds_rad_s: list[float], torques_nm: list[float]) -> Stride:
+def stride_of(speeds_rad_s: list[float], torques_nm: list[float], fastest_rad_s: float = inf) -> Stride:
     """Return the sums of a stroke: torques of blocks, and the speeds between them."""
-    strokes = JointStrokes("left_sweep", INERTIA_KG_M2, NO_FRICTION, JOINED_BLOCKS)
+    strokes = JointStrokes("left_sweep", INERTIA_KG_M2, NO_FRICTION, JOINED_BLOCKS, fastest_rad_s)
     states = [DriveState(0.0, each, 1.0 + n * BLOCK_TICKS * PERIOD_S) for n, each in enumerate(speeds_rad_s)]
     for before, after, torque_nm in zip(states, states[1:], torques_nm, strict=False):
         strokes.add(before, after, torque_nm, 0.0)
@@ -57,6 +57,15 @@ def test_a_joint_that_the_mud_lets_go_of_shows_no_gain_while_it_is_faster_than_a
     """Measured in a simulated walk with play in its belts: the rotor turns alone while the torque rises."""
     fast = stride_of([-22.31, -13.98, -2.12, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4], [0.1627, 0.5278, 0.3643, *[0.0] * 6])
     assert fast.gain_beyond(FACTOR_OF_ONE) is None
+
+
+@pytest.mark.parametrize(("fastest_rad_s", "is_weak"), [(inf, True), (10.0, False), (8.0, False)])
+def test_a_motor_that_has_used_up_its_voltage_shows_no_gain(fastest_rad_s: float, is_weak: bool) -> None:
+    """Of a DM4340P, whose speeds end at 10 rad/s: the mud throws the sweep, and full torque drives it no further."""
+    speeds_rad_s = [-9.97, -9.97, -9.97, -9.97, -4.09, 7.63, 6.83, 2.18, 1.27, 2.84, 3.56, 3.36, 2.88]
+    torques_nm = [-0.6, -0.6, -0.501, 0.25, 0.421, -0.034, -0.159, -0.028, 0.063, 0.032, -0.002, -0.014]
+    thrown = stride_of(speeds_rad_s, torques_nm, fastest_rad_s)
+    assert (thrown.gain_beyond(FACTOR_OF_ONE) is not None) == is_weak
 
 
 @pytest.mark.parametrize(("gain", "is_wrong"), [(1.0, False), (2.5, True)])
