@@ -34,11 +34,11 @@ from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import INSTALLED, load_configuration
+from firmware_host.configuration.socket_paths import rows_path
 from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.log.log_folder import first_path, new_run_id
 from firmware_host.log.recorder import NullRecorder, Recorder, Recording
-from firmware_host.log.row_stream import stream_path
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.pose_sources import open_pose
@@ -115,7 +115,7 @@ def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | Nu
         raise PermissionError(errno.EACCES, "is not writable", str(folder))
     run_id = new_run_id(robot)
     metadata = {"robot": robot, "run_id": run_id} | build_metadata()
-    stream = {"path": str(stream_path(Path(configuration.status.socket))), "rights": rights}
+    stream = {"path": str(rows_path(Path(configuration.status.socket))), "rights": rights}
     return Recorder(
         first_path(folder, run_id), configuration.text, metadata, configuration.log, stream, configuration.rig
     )

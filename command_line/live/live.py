@@ -19,7 +19,7 @@ from command_line.errors import CommandError, usage_error
 from command_line.screen import complain
 from command_line.shared_options import Socket
 from experiments.study.option import Option
-from firmware_host.log.row_stream import stream_path
+from firmware_host.configuration.socket_paths import rows_path
 from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.row_subscription import RowSubscription
 
@@ -59,7 +59,7 @@ def live(
         raise CommandError(f"{host}:{port}: {problem.strerror or problem}") from None
     print(f"Serving on {address}. Ctrl-C ends.", flush=True)
     try:
-        pass_on(RowSubscription(stream_path(Path(socket))), audience)
+        pass_on(RowSubscription(rows_path(Path(socket))), audience)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would interrupt the end of the server's threads
         return exit_codes.OK

@@ -16,7 +16,7 @@ from command_line.live.live import pass_on
 from command_line.ros2.leased_walk import LeasedWalk
 from command_line.shared_options import Socket
 from experiments.study.option import Option, OptionError
-from firmware_host.log.row_stream import stream_path
+from firmware_host.configuration.socket_paths import rows_path
 from operator_client.row_subscription import RowSubscription
 from operator_client.status_client import StatusClient
 
@@ -56,7 +56,7 @@ def ros2(
             node.watch_others()
             place = f"{namespace or '/'} in domain {domain} by {router}"
             print(f"ROS 2 {distribution}: {place}. Files for the laptop: {LAPTOP_FILES}. Ctrl-C ends.", flush=True)
-            pass_on(RowSubscription(stream_path(Path(socket))), audience)
+            pass_on(RowSubscription(rows_path(Path(socket))), audience)
     except KeyboardInterrupt:
         return exit_codes.OK
 

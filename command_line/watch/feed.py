@@ -17,7 +17,7 @@ from typing import Any
 from command_line.watch.history import History
 from control.modes import Mode
 from control.records import Phase
-from firmware_host.log.row_stream import stream_path
+from firmware_host.configuration.socket_paths import rows_path
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
 from firmware_host.operator.reports import known
 from operator_client.live_rows import LiveRow
@@ -50,7 +50,7 @@ class Feed:
         self.lock = threading.Lock()
         self._path, self._period_s = path, period_s
         self._client: StatusClient | None = None
-        self.rows = RowSubscription(stream_path(path))
+        self.rows = RowSubscription(rows_path(path))
         self._asked_s = float("-inf")
         self._pid = 0
         self._ending = threading.Event()

@@ -26,6 +26,7 @@ from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from drivers.power_switch import EmergencyStopParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.configuration.drive_consistency import bus_problems, drive_problems, rig_problems
+from firmware_host.configuration.socket_paths import operators_path, rows_path
 from firmware_host.configuration.toml_records import shown
 
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
@@ -94,8 +95,8 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
             yield f"{key} = {path!r}: must be at most {longest} bytes long, without a zero byte"
     if not Path(status).name:
         yield f"status.socket = {status!r}: must name a socket"
-    if pose and pose == status:
-        yield f"pose.socket = {pose!r}: must not be status.socket"
+    elif pose and Path(pose) in (Path(status), operators_path(Path(status)), rows_path(Path(status))):
+        yield f"pose.socket = {pose!r}: must be another socket than status.socket and those next to it"
     for key in ("read_group", "drive_group"):
         if "\0" in getattr(configuration.status, key):
             yield f"status.{key}: must be without a zero byte"

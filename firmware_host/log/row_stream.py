@@ -38,11 +38,6 @@ PACKET_BYTES = 32 * 1024  # less than the kernel's smallest usual buffer
 BUFFER_BYTES = 512 * 1024  # of one subscriber: three seconds of rows; the kernel may allow less
 
 
-def stream_path(status_socket: Path) -> Path:
-    """Return the path of the rows' socket, next to the status socket."""
-    return status_socket.with_name(f"{status_socket.stem}-rows.sock")
-
-
 def read_rights(values: Sequence[Any]) -> Rights:
     """Return rights that have been JSON on their way from the loop."""
     readers, operators, own_uid, anyone_may_stop = values

@@ -18,12 +18,6 @@ from pathlib import Path
 
 PROBE_S = 1.0  # the longest wait for a daemon to accept a connection
 OPEN_FILE, GROUP_FILE, OPEN_FOLDER = 0o666, 0o660, 0o755
-OPERATORS = "-operators"  # in the name of their own socket
-
-
-def operators_path(path: Path) -> Path:
-    """Return the path of the operators' own socket, next to the socket for every user."""
-    return path.with_name(f"{path.stem}{OPERATORS}{path.suffix}")
 
 
 class AlreadyServedError(Exception):

@@ -19,11 +19,12 @@ from typing import Any
 
 import msgpack
 
+from firmware_host.configuration.socket_paths import operators_path
 from firmware_host.sockets.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
 from firmware_host.sockets.listener import Listener
 from firmware_host.sockets.rights import Peer, Rights, read_peer
 from firmware_host.sockets.rpc import RESPONSE, MalformedError, RefusedError, read_params, read_shape
-from firmware_host.sockets.socket_file import SocketFile, operators_path
+from firmware_host.sockets.socket_file import SocketFile
 
 MOST_CLIENTS, MOST_OPERATORS = 16, 8  # of the socket for every user, and of the operators' own
 BACKLOG = 4096  # connections that wait to be accepted; the kernel limits it to net.core.somaxconn

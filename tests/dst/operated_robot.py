@@ -17,13 +17,13 @@ import msgpack
 from control.records import JOINTS
 from drivers.fault_injection.failure_table import SCHEDULED, FailureMode
 from drivers.mit.parameters import MitParameters
+from firmware_host.configuration.socket_paths import operators_path
 from firmware_host.daemon import Shutdown, end_safely
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.operator.operator_calls import Method, OperatorCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import REQUEST, RefusedError
-from firmware_host.sockets.socket_file import operators_path
 from firmware_host.sockets.status_socket import StatusSocket
 from simulation.harness.joint_energy import JointEnergy
 from tests.dst.scenario import HARMING, Call, Drift, Event, Failure, HangUp, Restart, Send, Suspend, Terminate

@@ -14,8 +14,8 @@ from command_line.main import main
 from command_line.operation.confirmation import TORQUE_UNKNOWN
 from command_line.shared_options import DEFAULT_SOCKET
 from control.modes import Mode
+from firmware_host.configuration import socket_paths
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
-from firmware_host.sockets import socket_file
 from logs.files.log_reader import read_log
 from logs.files.log_summary import log_summary
 from logs.replay import replay_files
@@ -147,4 +147,4 @@ def test_the_command_line_and_the_daemon_agree() -> None:
     """The command line keeps copies of the daemon's constants because `status` has to start fast."""
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
     assert StatusParameters().socket == DEFAULT_SOCKET
-    assert OPERATORS == socket_file.OPERATORS
+    assert OPERATORS == socket_paths.OPERATORS

@@ -8,8 +8,9 @@ import pytest
 
 from command_line.watch.feed import STATUS_S, Feed, updated
 from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.configuration.socket_paths import rows_path
 from firmware_host.log.recorder import NullRecorder
-from firmware_host.log.row_stream import RowStream, stream_path
+from firmware_host.log.row_stream import RowStream
 from firmware_host.log.rows import TICK, TICK_KIND
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.user_groups import load_rights
@@ -61,7 +62,7 @@ def test_with_rows_the_daemon_is_asked_less_often_and_the_screen_stays_current(
     robot.methods["status"] = counted_status
     rights = load_rights(StatusParameters())
     with robot.served(short_folder / "s"):
-        stream = RowStream(stream_path(short_folder / "s"), rights, {})
+        stream = RowStream(rows_path(short_folder / "s"), rights, {})
         feed = Feed(short_folder / "s", 0.1)
         assert feed.poll(0.0)  # connects to the status socket and the row stream
         while not feed.rows.live:

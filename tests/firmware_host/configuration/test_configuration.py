@@ -154,6 +154,12 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     (SOCKET, "x" * 120, [f"status.socket = '{'x' * 120}': must be at most 97 bytes"]),
     (SOCKET, "", ["status.socket = '': must name a socket"]),
     (SOCKET, "/", ["status.socket = '/': must name a socket"]),
+    *[
+        ("[status]", f'[pose]\nsocket = "/run/mudskipper/./{name}.sock"\n[status]', [
+            f"pose.socket = '/run/mudskipper/./{name}.sock': must be another socket than status.socket"
+        ])
+        for name in ("mudskipper", "mudskipper-rows", "mudskipper-operators")
+    ],
     ("[status]", '[emergency_stop]\nsource = "key"\n[status]', [
         "emergency_stop.device = '': must be given", "emergency_stop.key = '': must be given"
     ]),

@@ -8,10 +8,10 @@ from typing import Any
 import msgpack
 
 from control.rate import PERIOD_S
+from firmware_host.configuration.socket_paths import operators_path
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Group, Peer, Rights
 from firmware_host.sockets.rpc import RefusedError
-from firmware_host.sockets.socket_file import operators_path
 from firmware_host.sockets.status_socket import StatusSocket
 
 

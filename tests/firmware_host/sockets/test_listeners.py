@@ -13,9 +13,10 @@ import msgpack
 import pytest
 
 from control.rate import PERIOD_S
+from firmware_host.configuration.socket_paths import operators_path
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
-from firmware_host.sockets.socket_file import SocketFile, operators_path
+from firmware_host.sockets.socket_file import SocketFile
 from firmware_host.sockets.status_socket import ACCEPTING_S, MOST_ACCEPTS, MOST_CLIENTS, MOST_OPERATORS
 from operator_client.status_client import StatusClient
 from tests.firmware_host.sockets.served_socket import METHODS, OPERATOR, OTHER_USER, Served, connect, is_open, serve
