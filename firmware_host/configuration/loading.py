@@ -4,8 +4,9 @@ A file is read in four steps: keys of version 0.1 get their present names, a gai
 each value is checked against its own bounds, and then the values are checked against each other.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -40,6 +41,7 @@ FORMER_KEYS = {  # key of version 0.1: present key in the same section; version 
     "estimation.paper_compensation": "paper.compensation",
     "log.min_free_share": "min_free_fraction",
 }
+PATHS = ("log.directory", "status.socket", "pose.socket", "pose.rail_encoder.device", "emergency_stop.device")
 NO_KEYS = frozenset({"text", "warnings"})  # fields of the record that are no keys of the file
 
 _DRIVE = OneOf("type", {name: each.parameters for name, each in DRIVE_TYPES.items()}, DEFAULT)
@@ -50,17 +52,21 @@ def load_configuration(path: Path) -> Configuration:
     """Read the file of a robot that is to run. Raises ConfigurationError, also for a file that cannot be read.
 
     Unlike the text in a log, which may be of an earlier version or another computer, it needs a reason for weakened
-    protection and interfaces that are installed.
+    protection, interfaces that are installed, and paths that every account reads alike.
     """
     configuration = parse_configuration(read_text(path), path)
-    problems = [
-        f"bus.{name}.interface = {bus.interface!r}: {problem}"
-        for name, bus in configuration.bus.items()
-        if (problem := interface_problem(bus.interface))
-    ]
-    if problems:
+    if problems := list(_problems_here(configuration)):
         raise ConfigurationError(problems)
     return require_reason(configuration)
+
+
+def _problems_here(configuration: Configuration) -> Iterator[str]:
+    for name, bus in configuration.bus.items():
+        if problem := interface_problem(bus.interface):
+            yield f"bus.{name}.interface = {bus.interface!r}: {problem}"
+    for key in PATHS:
+        if (path := attrgetter(key)(configuration)).startswith("~"):
+            yield f"{key} = {path!r}: must be written out, since ~ is another folder for the daemon than for you"
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:

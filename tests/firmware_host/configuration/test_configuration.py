@@ -10,7 +10,7 @@ from control.records import JOINTS
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.gait_file import PROTOCOLS
-from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.loading import PATHS, load_configuration, parse_configuration
 from firmware_host.daemon import main
 from simulation.harness.drive_presets import calibrated
 
@@ -354,6 +354,14 @@ def test_a_room_in_which_every_motor_counts_as_hot_is_refused() -> None:
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
         load_configuration(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("key", PATHS)
+def test_a_path_in_the_home_folder_of_whoever_reads_the_file_is_refused(key: str, tmp_path: Path) -> None:
+    path, (section, _, name) = tmp_path / "mudskipper.toml", key.rpartition(".")
+    path.write_text(f'{minimal_text()}\n[{section}]\n{name} = "~/x"\n', encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=f"^{re.escape(key)} = '~/x': must be written out"):
+        load_configuration(path)
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
