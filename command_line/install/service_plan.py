@@ -125,7 +125,8 @@ def plan_installation(system: System, folder: Path | None = None) -> Plan:
         _plan_link(plan, system, link)
     written = {step.path for step in plan.steps if isinstance(step, WriteFile)}  # also one that was deleted
     changed = {path for path in after if before.get(path) != after[path] or system.root / path in written}
-    plan.steps.extend(_commands(system, changed))
+    is_new = UNIT not in before or not (system.root / LINKS[0]).is_symlink()  # an edited unit survives a removal
+    plan.steps.extend(_commands(system, changed, is_new))
     if before != after:
         plan.steps.append(WriteFile(system.root / MANIFEST, json.dumps(after, indent=1) + "\n"))
     if UNIT in changed and before:
@@ -161,7 +162,8 @@ def _target(system: System, link: str) -> Path:
     return system.prefix / "bin" / Path(link).name
 
 
-def _commands(system: System, changed: set[str]) -> Iterator[Step]:
+def _commands(system: System, changed: set[str], is_new: bool) -> Iterator[Step]:
+    """Only a new installation enables services: an upgrade leaves disabled what the operator has disabled."""
     live = system.live
     if SYSUSERS in changed:
         yield system.command("systemd-sysusers")
@@ -173,12 +175,12 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
         present = [str(device) for device in devices if device.exists()]
         if present:
             yield Command(("udevadm", "trigger", "--action=add", *present))
-    if not system.is_enabled(NETWORKD):
+    if is_new and not system.is_enabled(NETWORKD):
         yield system.command("systemctl", "enable", *(("--now",) if live else ()), NETWORKD)
         yield system.command("systemctl", "disable", WAIT_ONLINE)  # a CAN bus is never online; the boot would hang
     if NETWORK in changed and live:
         yield Command(("networkctl", "reload"))
-    if not system.is_enabled(SERVICE):
+    if is_new and not system.is_enabled(SERVICE):
         yield system.command("systemctl", "enable", SERVICE)
 
 

@@ -180,6 +180,19 @@ def test_a_system_with_networkd_keeps_its_wait_for_the_network(machine: Machine)
     assert not [line for line in commands(plan_installation(machine.system())) if "systemd-networkd" in line]
 
 
+def test_what_the_operator_disabled_stays_so_until_the_service_is_removed(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.install()
+    machine.enabled.clear()
+    machine.edit(UNIT)
+    release(monkeypatch, NETWORK)
+    assert machine.install() == exit_codes.OK and not machine.enabled
+    machine.uninstall()
+    machine.install()
+    assert machine.enabled == {"systemd-networkd", "mudskipper"}
+
+
 def test_a_service_that_runs_is_never_restarted_under_a_robot(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
