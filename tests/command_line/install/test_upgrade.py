@@ -2,10 +2,12 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,6 +20,7 @@ from command_line.install.service_plan import (
     CONFIGURATION,
     DEFAULT_PREFIX,
     LIVE_UNIT,
+    UNIT,
     Outcome,
     load_sources,
     source_folder,
@@ -151,6 +154,23 @@ def test_the_package_refuses_in_the_same_modes(mode: str, tmp_path: Path) -> Non
     refuses = mode in {each.name.lower() for each in ENERGISED}
     assert ended.returncode == refuses
     assert ended.stderr.count("\n") == refuses and (f"in mode {mode}, " in ended.stderr) == refuses
+
+
+def test_a_purge_of_the_package_removes_an_edited_unit_too(tmp_path: Path) -> None:
+    answer: dict[str, Any] = {"run": lambda words: Outcome(0, ""), "find": str}
+    installation.install(root=tmp_path, **answer)
+    (tmp_path / UNIT).write_text("[Unit]\n# mine\n", encoding="utf-8")
+    installation.uninstall(root=tmp_path, **answer)
+    assert (tmp_path / UNIT).exists() and not (tmp_path / LIVE_UNIT).exists()
+    for name in ("systemctl", "groupdel", "userdel"):
+        (tmp_path / name).write_text("#!/bin/sh\n", encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    script = (ROOT / "debian" / "postrm").read_text(encoding="utf-8").replace("|/\\1|", f"|{tmp_path}/\\1|")
+    script, folders = re.subn(" (/(etc|var|opt)/)", rf" {tmp_path}\1", script)
+    assert folders == 4
+    path = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    subprocess.run(["sh", "-c", script, "postrm", "purge"], check=True, env=path)
+    assert not (tmp_path / UNIT).exists() and not (tmp_path / CONFIGURATION).exists()
 
 
 def test_a_key_that_is_gone_without_a_similar_one_is_named_alone() -> None:
