@@ -1,9 +1,12 @@
 """`mudskipper log pull`: copies finished logs from a robot with rsync over SSH, compares them, and marks them there.
 
-A mark is an empty file in copied/ of the robot's folder of logs; the quota deletes marked logs first. The same mark in
-the folder here says that a log need not be compared again. An interrupted copy continues with the same command.
+A mark is an empty file in copied/ of the robot's folder of logs, with the time of the log; the quota deletes marked
+logs first. The same mark in the folder here says that a log need not be compared again. A log that was annotated on the
+robot since is copied again, unless it was annotated here too; the copy before moves to .replaced/. An interrupted copy
+continues with the same command.
 """
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -20,12 +23,13 @@ from command_line.screen import complain
 from experiments.reports.counted_nouns import counted
 from experiments.study.option import Option
 from experiments.study.values import folder
-from firmware_host.log.log_folder import COPIED, DONE, ENDING, PRESERVED, log_files, mark_of
+from firmware_host.log.log_folder import COPIED, DONE, ENDING, PRESERVED, is_copied, log_files, mark_of
 
 ROBOTS_LOGS = "/var/lib/mudskipper/logs"
 SILENT_S = 30  # of the network: the copy ends; rsync alone takes what it still sends for a sign of life
 PLACES = [f"--include=/{name}/" for name in (DONE, PRESERVED)]  # of finished logs, here as there
 RSYNC = ("rsync", "--recursive", "--times", f"--timeout={SILENT_S}", "--partial-dir=.partial")
+REPLACE = ("--backup", "--backup-dir=.replaced", "--modify-window=2")  # the seconds that a FAT disk knows
 SSH = f"--rsh=ssh -o ConnectTimeout={SILENT_S} -o ServerAliveInterval={SILENT_S // 3} -o ServerAliveCountMax=3"
 
 
@@ -38,14 +42,17 @@ def pull(
         raise CommandError(f"{robot}: there is no such folder, and a robot's name ends with a colon: '{robot}:'")
     into.mkdir(parents=True, exist_ok=True)
     before = log_files(into, DONE, PRESERVED)
+    unchanged = [path for path in before if is_copied(path, into)]
     progress = ["--info=progress2"] * sys.stderr.isatty()
     try:
         with tempfile.NamedTemporaryFile("w", encoding="utf-8", errors="surrogateescape") as known:
-            # a log that is here may have a note added here, or be preserved since
-            known.writelines(f"/*/{escape(path.name)}\n" for path in before)
+            known.writelines(_exclusion(path, path in unchanged) for path in before)
             known.flush()
             chosen = [f"--exclude-from={known.name}", *PLACES, f"--include=/*/*{ENDING}", "--exclude=*"]
-            _rsync(source, [*progress, *chosen, f"{source}/", f"{into}/"])
+            _rsync(source, [*progress, *REPLACE, *chosen, f"{source}/", f"{into}/"])
+        for path in unchanged:
+            if not is_copied(path, into):  # any more: it was replaced
+                mark_of(path, into).unlink()
         logs = [path for path in log_files(into, DONE, PRESERVED) if not mark_of(path, into).exists()]
         compared = _compare(source, into, logs)
     except (CommandError, KeyboardInterrupt) as problem:
@@ -92,6 +99,12 @@ def _rsync(source: str, arguments: Sequence[str]) -> str:
     return ended.stdout or ""
 
 
+def _exclusion(log: Path, is_unchanged: bool) -> str:
+    """Return rsync's pattern for a log that is here: it may have a note added here, or be preserved on one side."""
+    other = PRESERVED if log.parent.name == DONE else DONE
+    return f"/{other if is_unchanged else '*'}/{escape(log.name)}\n"
+
+
 def _place(log: Path) -> str:
     return f"{log.parent.name}/{log.name}"
 
@@ -122,4 +135,6 @@ def _mark(source: str, into: Path, logs: Sequence[Path]) -> None:
 def _touch_marks(place: Path, logs: Sequence[Path]) -> None:
     (place / COPIED).mkdir(exist_ok=True)
     for path in logs:
-        mark_of(path, place).touch()
+        mark = mark_of(path, place)
+        mark.touch()
+        os.utime(mark, (path.stat().st_mtime,) * 2)

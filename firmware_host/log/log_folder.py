@@ -126,7 +126,7 @@ def deletable_logs(folder: Path) -> list[Path]:
     """Return the finished logs, copied ones before others, the oldest first; without the newest of all."""
     unfinished = unfinished_files(folder)
     finished = [path for path in log_files(folder, TOP, DONE) if path not in unfinished]
-    return sorted(finished[:-1], key=lambda path: not mark_of(path, folder).exists())
+    return sorted(finished[:-1], key=lambda path: not is_copied(path, folder))
 
 
 def mark_of(log: Path, folder: Path) -> Path:
@@ -134,19 +134,26 @@ def mark_of(log: Path, folder: Path) -> Path:
     return folder / COPIED / log.stem
 
 
+def is_copied(log: Path, folder: Path) -> bool:
+    """Return whether a log was copied and has not been annotated since: its mark has the time of what was copied."""
+    with suppress(OSError):
+        return int(mark_of(log, folder).stat().st_mtime) >= int(log.stat().st_mtime)
+    return False
+
+
 def copies_text(folder: Path) -> str:
     """Return how many logs of a folder were not copied yet."""
     logs = log_files(folder, TOP, DONE)
-    return f"{sum(not mark_of(path, folder).exists() for path in logs)} of {len(logs)} not copied"
+    return f"{sum(not is_copied(path, folder) for path in logs)} of {len(logs)} not copied"
 
 
 def delete_log(path: Path) -> str:
     """Delete a log, and return the message about it."""
-    mark = mark_of(path, path.parent.parent if path.parent.name == DONE else path.parent)
-    copied = "copied before" if mark.exists() else "not copied"
+    folder = path.parent.parent if path.parent.name == DONE else path.parent
+    copied = "copied before" if is_copied(path, folder) else "not copied"
     message = f"room for logs: {path.name} was deleted, {_size(path)} bytes, {copied}"
     path.unlink()
-    mark.unlink(missing_ok=True)
+    mark_of(path, folder).unlink(missing_ok=True)
     return message
 
 

@@ -1,12 +1,15 @@
 """`mudskipper log pull` copies finished logs once, marks them, and continues; rsync is a double."""
 
 import json
+import os
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes
+from firmware_host.log.log_folder import copies_text
 from tests.command_line.command_lines import json_of, run, run_process
 from tests.folders import ROOT
 
@@ -31,6 +34,9 @@ for source in map(pathlib.Path, (each.split(":")[-1] for each in sources)):
         continue
     for log in sorted([*source.glob("done/*.mcap"), *source.glob("kept/*.mcap")]):
         if any(fnmatch.fnmatchcase(f"/{log.parent.name}/{log.name}", each) for each in known):
+            continue
+        present = target / log.parent.name / log.name
+        if present.exists() and present.stat().st_mtime == log.stat().st_mtime:
             continue
         if (left := left - 1) < 0:
             if "INTERRUPT" in os.environ:
@@ -72,6 +78,22 @@ def test_a_log_that_was_preserved_on_either_side_is_not_copied_again(robot: Path
     Path("here/done/2.mcap").rename("here/kept/2.mcap")
     assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == []
     assert sorted(path.name for path in Path("here").rglob("*.mcap")) == ["1.mcap", "2.mcap", "3.mcap"]
+
+
+def test_an_annotation_on_the_robot_reaches_the_copy_unless_that_was_annotated_too(robot: Path) -> None:
+    def annotate(log: Path, text: str) -> None:
+        log.write_text(text)
+        os.utime(log, (time.time() + 10.0,) * 2)
+
+    run("log", "pull", f"host:{robot}", "here")
+    assert copies_text(robot) == "0 of 2 not copied"
+    for name in "12":
+        annotate(robot / "done" / f"{name}.mcap", "theirs")
+    annotate(Path("here/done/2.mcap"), "mine")
+    assert copies_text(robot) == "2 of 2 not copied"
+    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == ["1.mcap"]
+    assert [Path(f"here/done/{name}.mcap").read_text() for name in "12"] == ["theirs", "mine"]
+    assert copies_text(robot) == "1 of 2 not copied"
 
 
 def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
