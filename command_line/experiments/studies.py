@@ -215,11 +215,12 @@ def _run(
     simulated = {key: value for key, value in typed.items() if key == "simulated"}
     marked = " (simulated)" if simulated.get("simulated") else ""
     result = replace(result, title=f"{result.title or f'Experiment: {name}'}{marked}")
+    end = {"options": typed, "plan": plan_in(results), "ending": result.ending.name.lower()}
     report = (
         {"schema": f"experiment-{name}/{getattr(module, 'SCHEMA', 1)}", "experiment": name}
         | result.json()
         | simulated
-        | {"provenance": provenance(module.__name__) | {"options": typed, "plan": plan_in(results)}}
+        | {"provenance": provenance(module.__name__) | end}
     )
     rows = trials.measured if trials else ()
     return write_page(results, result, report, rows, **given_options(options, write_page))

@@ -62,17 +62,19 @@ def fitted_changes(fits: Sequence[JointFit], session: Session) -> dict[tuple[str
 
 def apply_changes(path: Path, changes: Changes, session: Session) -> tuple[str, Ending]:
     """Show the difference, write it if the operator agrees, and return a message."""
-    operator, is_written = session.operator, False
+    operator, answers = session.operator, list[str]()
+    by_hand = f"To write by hand:\n{lines_of(changes)}"
 
     def agrees(difference: str) -> bool:
-        nonlocal is_written
         operator.report(difference)
-        is_written = operator.ask(f"Write this to {path}?", {WRITE: "write it", "": "leave it"}, lambda: None) == WRITE
-        return is_written
+        answers.append(operator.ask(f"Write this to {path}?", {WRITE: "write it", "": "leave it"}, lambda: None))
+        return answers == [WRITE]
 
     try:
         done = change_file(path, read_text(path), changes, agrees)
     except FileChangeError as problem:
-        return f"nothing was applied: {problem}. To write by hand:\n{lines_of(changes)}", Ending.REFUSED
+        return f"nothing was applied: {problem}. {by_hand}", Ending.REFUSED
+    if answers == [""]:
+        return f"{done}; the same command with --out {session.folder} asks again. {by_hand}", Ending.REFUSED
     has_constant = any(name == "torque_constant_nm_a" for *_, name in changes)
-    return done + SET_DRIVES * (is_written and has_constant), Ending.DONE
+    return done + SET_DRIVES * (has_constant and answers == [WRITE]), Ending.DONE

@@ -12,7 +12,7 @@ from experiments.actuator.plan import WeighingPlan
 from experiments.actuator.report import make_result
 from experiments.calibration.drive_identities import calibration_records, identify_drives
 from experiments.calibration.hand_steps import HandSteps, hand_changes
-from experiments.calibration.report import arm_changes, report_calibration
+from experiments.calibration.report import arm_changes, change_table, report_calibration
 from experiments.calibration.robots import CalibratedRobot
 from experiments.calibration.torque_steps import torque_key, torque_steps
 from experiments.robot.steps import conduct_steps
@@ -56,4 +56,6 @@ def calibrate_robot(
     changes |= calibration_records(configuration, drives, done, begun)
     applied, ending = apply_changes(target, changes, session)
     weighed = make_result(plan, readings, fits, applied, session.simulated)
-    return replace(report_calibration(drives, entries, corrected, plan.joints, weighed), logs=logs, ending=ending)
+    result = report_calibration(drives, entries, corrected, plan.joints, weighed)
+    tables = [*result.tables, change_table(configuration, changes)]
+    return replace(result, tables=tables, logs=logs, ending=ending)

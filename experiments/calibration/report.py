@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from math import isfinite
 from statistics import fmean
 from typing import Any
 
 from pandas import DataFrame
 
+from experiments.actuator.file_change import Changes, lines_of
 from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import WeighingPlan
 from experiments.calibration.drive_identities import Identities
@@ -17,6 +19,7 @@ from experiments.study.notebook import Entry
 from experiments.study.result import Result, Table
 from experiments.study.results_folder import ResultFiles
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.toml_records import parse_document
 
 FILES = ResultFiles("calibration.html", "calibration.json")
 HANDS = (
@@ -40,6 +43,17 @@ def arm_changes(
     if abs(mass_kg - arm.arm_mass_kg) <= WEIGHT_FRACTION * arm.arm_mass_kg:
         return {}
     return {("arm", "arm_mass_kg"): round(mass_kg, 4)}
+
+
+def change_table(configuration: Configuration, changes: Changes) -> Table:
+    """Return every key that was determined, whether it was written or not."""
+    document = parse_document(configuration.text)
+    before = {path: reduce(lambda table, name: table.get(name, {}), path, document) for path in changes}
+    rows = [
+        (*new.split(" = ", 1), old.partition(" = ")[2].replace("{}", "-"))
+        for new, old in zip(lines_of(changes).splitlines(), lines_of(before).splitlines(), strict=True)
+    ]
+    return Table("changes", "", {}, DataFrame(rows, columns=["key", "value", "before"]), "Values", on_page_only=True)
 
 
 def report_calibration(

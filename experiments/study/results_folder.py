@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from experiments.study.notebook import NAME, NotebookError, count_entries
 from experiments.study.provenance import program_text
+from experiments.study.session import Ending
 
 PAGE, SUMMARY, RESULTS = "report.html", "summary.json", "results.parquet"
 
@@ -49,7 +50,8 @@ def _numbered(path: Path) -> Iterator[Path]:
 def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any], files: ResultFiles = USUAL) -> None:
     """Raises NotebookError for results of another experiment, and for a finished one.
 
-    One that was finished with other options, such as fewer trials, may continue: its notebook decides.
+    One that was finished with other options, such as fewer trials, may continue: its notebook decides. So may one whose
+    changes were not written to the configuration.
     """
     summary: dict[str, Any] = {}
     with suppress(OSError, ValueError):
@@ -58,7 +60,8 @@ def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any]
     if earlier != experiment:
         raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
     record = summary.get("provenance", {})
-    if (folder / files.page).exists() and options == record.get("options", options):
+    is_whole = (folder / files.page).exists() and record.get("ending") != Ending.REFUSED.name.lower()
+    if is_whole and options == record.get("options", options):
         raise NotebookError(
             f"{folder} has a finished experiment {experiment}, of {record.get('date', 'an unknown date')} by "
             f"{program_text(record)}: choose another folder with --out, or begin again with --restart, which renames "

@@ -1,6 +1,7 @@
 """`mudskipper calibrate`, from the command to the page."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from experiments.studies import calibrate
+from experiments.study.prompt import AutomaticOperator
 from firmware_host.configuration.loading import load_configuration
 from tests.experiments.calibration.test_calibration import TRUE_NM_A, WeighedRobot
 
@@ -16,11 +18,21 @@ pytestmark = pytest.mark.usefixtures("png_alone")
 COMMAND = ("calibrate", "--simulated", "--joint", "right_adduction")
 
 
+def leave_the_file(_: AutomaticOperator, question: str, answers: Mapping[str, str], meanwhile: object) -> str:
+    return "" if question.startswith("Write this") else next(iter(answers))
+
+
 def test_one_command_finds_what_a_simulated_robot_was_built_with(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(calibrate, "CalibratedRobot", WeighedRobot)  # without the minutes of the weights
     command = [*COMMAND, "--operator", "Ada", "--out", str(tmp_path)]
+    with monkeypatch.context() as patch:
+        patch.setattr(AutomaticOperator, "ask", leave_the_file)
+        assert main(command) == exit_codes.REFUSED
+    said = capsys.readouterr().out
+    assert f"left as it is; the same command with --out {tmp_path} asks again. To write by hand:\ndrive." in said
+    assert load_configuration(tmp_path / "mudskipper.toml").drive["right_adduction"].sign == 1
     assert main([*command, "--json"]) == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
     assert report == json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
@@ -29,7 +41,8 @@ def test_one_command_finds_what_a_simulated_robot_was_built_with(
     assert (report["operator"], hands["sign"]) == ("Ada", -1)  # by the robot of the default seed
     drive = load_configuration(tmp_path / "mudskipper.toml").drive["right_adduction"]
     assert drive.sign == -1 and drive.torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)
-    assert "by Ada" in (tmp_path / "calibration.html").read_text(encoding="utf-8")
+    page = (tmp_path / "calibration.html").read_text(encoding="utf-8")
+    assert "by Ada" in page and "drive.right_adduction.torque_constant_nm_a" in page
     assert main(command) == exit_codes.REFUSED  # it is finished
 
 
