@@ -7,14 +7,14 @@ gamepad vanishes, or when this program dies or hangs.
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Annotated, Any
 
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.operation.attended_walk import LEASE_S, RENEWAL_S, LiveLine
-from command_line.operation.confirmation import stop
+from command_line.operation.confirmation import disarm, stop
 from command_line.operation.operation import LEAST_DEPTH_CM
 from command_line.operation.pads import (
     ARM,
@@ -34,7 +34,7 @@ from command_line.screen import complain
 from command_line.shared_options import Socket
 from drivers.input_keys import InputKeys, find_devices
 from experiments.study.option import Option
-from operator_client.status_client import CallRefusedError, StatusClient
+from operator_client.status_client import CallRefusedError, NoDaemonError, StatusClient
 
 POLL_S = 0.02
 AGAIN_S = 0.3  # until a control that stays pressed acts again
@@ -88,6 +88,14 @@ class HandDrive:
         if self._client is not None:
             self._client.close()
         self._client = None
+
+    def end(self) -> None:
+        """Stop the robot on purpose, which is no fault of a lost lease."""
+        if self._client is not None:
+            with suppress(CallRefusedError, NoDaemonError):
+                self._client.call("stop")
+                self._client.call("release")
+        self.let_go()
 
     def _renewed(self, now_s: float) -> StatusClient:
         if self._client is None:
@@ -156,7 +164,7 @@ def joy(
         float | None, Option("insertion depth (default: adaptive)", unit="cm", low=LEAST_DEPTH_CM, high=20.0)
     ] = None,
 ) -> int:
-    """Drive until Ctrl-C. A robot that is driven is stopped at the end, and every drive has to confirm it."""
+    """Drive until Ctrl-C. A robot that is driven stops, its torque goes off, and every drive confirms that."""
     drive = HandDrive(partial(StatusClient, socket), None if depth is None else depth / 100.0)
     status, ended = exit_codes.OK, ""
     with opened_pad(device, keyboard) as pad, StatusClient(socket) as client:
@@ -166,10 +174,11 @@ def joy(
             status = exit_codes.INTERRUPTED
         except OSError as problem:
             ended = f"{problem.strerror or problem}: the gamepad or terminal is gone"
-        was_engaged = drive.engaged
-        drive.let_go()
-    if was_engaged and (stopped := stop(socket=socket)).print(as_json=False):
-        return stopped.status
+        endings = (stop, disarm) if drive.engaged else ()
+        drive.let_go() if ended else drive.end()
+    for end in endings:
+        if (stopped := end(socket=socket)).print(as_json=False):
+            return stopped.status
     if ended:
         raise CommandError(ended)
     return status

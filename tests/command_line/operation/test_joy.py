@@ -220,6 +220,22 @@ def test_releasing_the_dead_man_stops_the_robot_as_a_lost_lease(bench: Bench, mo
     assert "stopping" in seen and "joy" not in str(bench.wait_for(lambda report: True)["lease"])
 
 
+def test_the_key_that_ends_a_walk_stops_the_robot_without_a_fault(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[str] = []
+
+    def controls(report: Report) -> Controls:
+        seen.append(report["mode"])
+        pressed = {"idle": ARM, "hold": WALK, "walking": QUIT}.get(report["mode"], DEAD_MAN)
+        return Controls(len(seen) > 1, frozenset({pressed}))
+
+    driven_by(monkeypatch, bench, controls)
+    assert joy(socket=bench.socket) == exit_codes.OK
+    report = bench.wait_for(lambda report: report["mode"] == "idle")
+    assert "lease_lost" not in f"{report['notice']} {report['fault']}"
+
+
 def test_a_gamepad_that_vanishes_stops_the_robot(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[str] = []
 
