@@ -27,7 +27,7 @@ from firmware_host.log.row_records import Record, pack_record
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import RowKind
 from firmware_host.sockets.rights import Group, Peer, Rights, read_peer
-from firmware_host.sockets.socket_file import AlreadyServedError, SocketFile
+from firmware_host.sockets.socket_file import SocketFile
 from firmware_host.sockets.socket_methods import Level
 
 OPENING, LOST, REFUSAL, FULL = 255, 254, 253, 252
@@ -95,7 +95,7 @@ class RowStream:
         self._file: SocketFile | None = None
         try:
             self._file = SocketFile(path, BACKLOG, kind=socket.SOCK_SEQPACKET)
-        except (OSError, AlreadyServedError) as problem:
+        except OSError as problem:
             self.problem = f"rows are not served on {path}: {problem}"
 
     def publish(self, rows: Sequence[Record]) -> None:

@@ -5,7 +5,9 @@ it may do (rights.py), not the file: an existing folder keeps its permissions, a
 operators' own file admits their group alone.
 
 Symbolic links are not followed, and only a dead socket is removed: never a file, a link, or the socket of a daemon that
-lives or hangs. A folder in which any user could replace the socket is refused: one that all may write to, not sticky.
+lives or hangs. The rows' socket is removed also where it answers: this daemon owns the status socket by then, so the
+writer of one that has ended has it. A folder in which any user could replace the socket is refused: one that all may
+write to, not sticky.
 """
 
 import errno
@@ -106,14 +108,14 @@ def _remove_stale(path: Path, kind: int) -> None:
         return
     if not stat.S_ISSOCK(mode):
         raise FileExistsError(errno.EEXIST, "is there already and is no socket: remove it", str(path))
-    if _answers(path, kind):
+    if kind == socket.SOCK_STREAM and _answers(path):
         raise AlreadyServedError(f"another daemon is already running on {path}")
     path.unlink(missing_ok=True)
 
 
-def _answers(path: Path, kind: int) -> bool:
+def _answers(path: Path) -> bool:
     """Return whether a daemon listens; one that accepts no connection in time hangs, but is not dead."""
-    with socket.socket(socket.AF_UNIX, kind) as probe:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.settimeout(PROBE_S)
         try:
             probe.connect(str(path))

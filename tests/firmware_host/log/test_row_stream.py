@@ -122,9 +122,11 @@ def test_a_user_without_the_right_to_read_is_refused_with_the_reason(path: Path)
     stream.close()
 
 
-def test_a_stale_socket_is_replaced_and_a_live_one_is_not(path: Path, stream: RowStream) -> None:
-    assert "already" in RowStream(path, OWN, {}).problem
-    stream.close()
+def test_the_socket_of_an_earlier_daemon_s_writer_that_hangs_is_replaced(path: Path, stream: RowStream) -> None:
+    with closing(RowStream(path, OWN, {"robot": "new"})) as new:
+        stream.close()  # much later
+        with closing(subscribe(new, path)) as rows:
+            assert rows.metadata == {"robot": "new"}
     path.touch()
     assert "no socket" in RowStream(path, OWN, {}).problem
 
