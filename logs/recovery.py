@@ -11,6 +11,7 @@ one removed. A recovery that is interrupted at any point is continued by the nex
 """
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -194,7 +195,12 @@ def _rewrite(path: Path, target: Path, file: BinaryIO, salvage: Salvage, watch: 
 
 
 def main() -> None:
-    """Recover the unfinished logs of one folder, at low priority; the log's writer starts this as a process."""
+    """Recover the unfinished logs of one folder, at low priority; the log's writer starts this as a process.
+
+    The writer ignores the end of the service, and this inherits it; but a recovery may end in the middle.
+    """
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     with suppress(PermissionError):
         os.nice(5)
 

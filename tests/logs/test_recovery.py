@@ -1,6 +1,9 @@
 """A log whose writer was killed is recovered with every row on the disk, and other programs can open it."""
 
 import os
+import signal
+import subprocess
+import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,12 +16,14 @@ from rosbags.highlevel import AnyReader
 
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
+from firmware_host.log.recorder import BLOCKED
 from firmware_host.log.rows import TICK
 from logs import recovery
 from logs.files.log_error import LogError, Watch
 from logs.files.log_reader import read_log
 from logs.recovery import recover_all, recover_log, salvage_rows
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
+from tests.waiting import wait_until
 
 CHUNK = 100  # ticks
 
@@ -125,6 +130,28 @@ def test_a_recovery_that_was_cut_off_is_done_again(tmp_path: Path) -> None:
     recover_all(tmp_path, print)
     assert unfinished_files(tmp_path) == []
     assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
+
+
+def test_a_recovery_ends_with_the_service_though_the_writer_ignores_that(tmp_path: Path) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    os.mkfifo(tmp_path / ACTIVE / "hangs.mcap")
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED)
+    try:
+        process = subprocess.Popen([sys.executable, "-m", "logs.recovery", str(tmp_path)])
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        signal.signal(signal.SIGTERM, before)
+
+    def ends() -> bool:
+        process.terminate()
+        return process.poll() is not None
+
+    try:
+        wait_until(ends)
+    finally:
+        process.kill()
+    assert process.returncode == -signal.SIGTERM
 
 
 @pytest.mark.parametrize(("name", "contents"), [("film.part", b"half"), ("notes", b"")])
