@@ -9,7 +9,7 @@ from control.rate import RATE_HZ
 
 @dataclass(frozen=True)
 class LogParameters:
-    directory: Annotated[str, Meaning("of the log folder")] = "logs"
+    directory: Annotated[str, Meaning("of the log folder")] = "/var/lib/mudskipper/logs"
     enabled: Annotated[bool, Meaning("record every tick, stride and event")] = True
     segment_s: Annotated[float, Bounds(1.0, 86400.0), Meaning("longest time in one file")] = (
         600.0  # a file that viewers load at once

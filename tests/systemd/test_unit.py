@@ -18,6 +18,7 @@ from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_methods import Level
 from firmware_host.sockets.user_groups import load_rights
@@ -114,6 +115,7 @@ def test_the_socket_is_in_the_unit_s_runtime_directory(unit: Settings, configura
 def test_logs_go_into_the_unit_s_state_directory(unit: Settings, configuration: Configuration) -> None:
     state = Path("/var/lib") / only(unit, "StateDirectory")
     assert Path(configuration.log.directory).is_relative_to(state)
+    assert configuration.log.directory == LogParameters().directory
 
 
 def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settings) -> None:
