@@ -113,7 +113,7 @@ def film(
         from experiments.pictures.stride_strip import draw_strip
 
         save_picture(partial(draw_strip, recorded, strides), path)
-    names = [f"{outcome_of(recorded, each)} {each['index']}" for each in strides]
+    names = [f"{each['index']} ({outcome_of(recorded, each)})" for each in strides]
     print(f"strides  {', '.join(names)}\nwritten  {path}")
     return exit_codes.OK
 
