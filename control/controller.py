@@ -164,7 +164,7 @@ class Controller:
     def move(self, angles: Sequence[float | None], speed_rad_s: float = inf) -> None:
         """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle.
 
-        The speed is the mean one of the joint with the longest way, and never above the configured one.
+        The speed is the mean one of the joint with the longest path, and never above the configured one.
         """
         held_rad = self._held_rad
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held_rad, strict=True)))
@@ -260,7 +260,7 @@ class Controller:
         self._mode = mode
 
     def _raised(self, angles: JointAngles) -> JointAngles:
-        """Return the pose with level arms, in which the lower edge is H - h above the mud."""
+        """Return the pose with level arms, in which the lower edges are `clearance_m` above the mud."""
         return Joints(*(value for sweep_rad, _ in angles.flippers for value in (sweep_rad, 0.0)))
 
     def _begin_gait(self) -> None:

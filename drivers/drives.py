@@ -48,8 +48,8 @@ class Drives:
             own: dict[int, Callable[[bytes, float], None]] = {}
             for key, receive in chain.from_iterable(tables):
                 own[key] = partial(_both, own[key], receive) if key in own else receive
-            strange = {key: partial(self._on_other, *other) for key, other in (others or {}).get(name, {}).items()}
-            self._receivers.append((port, strange | own))
+            foreign = {key: partial(self._on_other, *other) for key, other in (others or {}).get(name, {}).items()}
+            self._receivers.append((port, foreign | own))
             port.listen_to(key & EXTENDED_MASK for key in self._receivers[-1][1])
         self.reset()
 

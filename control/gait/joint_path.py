@@ -2,7 +2,7 @@
 
 The controller uses it to reach the start of a stride and to raise the flippers when a walk ends. It needs no geometry,
 so it works from any pose that the joints can have. Its speed is a mean: with its ramps a joint is faster for a moment,
-by 1.05 times on a way of a second, by 2 times on one of a tenth, and by up to 2.8 times where short paths that begin
+by 1.05 times in a path of a second, by 2 times in one of a tenth, and by up to 2.8 times where short paths that begin
 with the velocity of the one before turn back and forth.
 """
 

@@ -14,7 +14,7 @@ class MotionParameters:
         float,
         Bounds(0.05, 10.0),
         Meaning(
-            "mean speed of the joint with the longest way outside of the gait, also in a stop, which lasts 3 s at most"
+            "mean speed of the joint with the longest path outside of the gait, also in a stop, which lasts 3 s at most"
         ),
     ] = 1.0
     fade_in_s: Annotated[

@@ -138,7 +138,7 @@ ANGLES = tuple(
 SPEED = Parameter(
     "speed_rad_s",
     Type.NUMBER,
-    "of the joint with the longest way, its mean over that way; never above motion.path_speed_rad_s",
+    "of the joint with the longest path, its mean over that path; never above motion.path_speed_rad_s",
     "rad/s",
     range=Bounds(0.01, 10.0),
     default=10.0,
