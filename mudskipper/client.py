@@ -9,12 +9,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from control.modes import ENERGISED, Mode
 from firmware_host.configuration.configuration import StatusParameters
 from mudskipper.ground_and_gait import Gait
 from operator_client.status_client import StatusClient
 
 POLL_S = 0.05
-RESTING = ("idle", "boot", "fault")  # modes without torque
+RESTING = tuple(mode.name.lower() for mode in Mode if mode not in ENERGISED)
 Report = dict[str, Any]
 
 

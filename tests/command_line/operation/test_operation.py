@@ -11,9 +11,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from command_line.operation.confirmation import TORQUE_UNKNOWN
+from command_line.operation.confirmation import RESTING, TORQUE_UNKNOWN
 from command_line.shared_options import DEFAULT_SOCKET
-from control.modes import Mode
+from control.modes import ENERGISED, Mode
 from firmware_host.configuration import socket_paths
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from logs.files.log_reader import read_log
@@ -148,3 +148,4 @@ def test_the_command_line_and_the_daemon_agree() -> None:
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
     assert StatusParameters().socket == DEFAULT_SOCKET
     assert OPERATORS == socket_paths.OPERATORS
+    assert set(RESTING) == {mode.name.lower() for mode in Mode if mode not in ENERGISED}
