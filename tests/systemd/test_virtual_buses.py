@@ -1,15 +1,18 @@
 """The guide's changes for an installation on virtual CAN buses agree with each other."""
 
+import os
 import re
 import shlex
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
-from tests.waiting import LONGEST_S
+from tests.waiting import LONGEST_S, wait_until
+from verification.virtual_machine import base_system
 from verification.virtual_machine.installed_robot import GUIDE, installation
 
 SYSTEMD = ROOT / "systemd"
@@ -70,6 +73,20 @@ def test_the_virtual_machine_is_installed_by_the_guide_s_commands() -> None:
     ]
     positions = [script.index(f"\n{{ {command}") for command in commands if command not in left_out]
     assert positions == sorted(positions)
+
+
+def test_a_second_run_of_the_virtual_machine_waits_for_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(base_system, "PROJECT", tmp_path)
+    lock = base_system.lock_clone.__wrapped__
+    first = lock()
+    with ThreadPoolExecutor(1) as threads:
+        second = threads.submit(lock)
+        wait_until(lambda: "waiting for its end" in capsys.readouterr().err)
+        assert not second.done()
+        os.close(first)
+        os.close(second.result())
 
 
 def test_the_virtual_machine_installs_the_locked_requirements_and_nothing_else() -> None:

@@ -5,12 +5,14 @@ of packages or the project's dependencies change. The guest has no network, so t
 host, for the guest's Python, and installed from a folder.
 """
 
+import fcntl
 import hashlib
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -52,6 +54,18 @@ IN_THE_GUEST = (
 
 class BuildError(Exception):
     """The image cannot be built; the text says why and what to do."""
+
+
+@cache
+def lock_clone() -> int:
+    """Wait until no other process uses the disks of this clone; this one does for as long as it lives."""
+    descriptor = os.open(PROJECT, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        print("Another 'make test-vm' runs in this clone: waiting for its end ...", file=sys.stderr, flush=True)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
 
 
 def install_missing_packages() -> None:

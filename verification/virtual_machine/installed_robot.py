@@ -20,6 +20,7 @@ from verification.virtual_machine.base_system import (
     base_system,
     fingerprint,
     install_missing_packages,
+    lock_clone,
     run,
 )
 
@@ -39,6 +40,7 @@ class Disk(NamedTuple):
 
 def installed_robot(name: str = "robot", last_commands: str = "") -> Disk:
     """Return a disk that was never booted; copy it before booting. `last_commands` follow those of the guide."""
+    lock_clone()
     install_missing_packages()
     archive = base_system()
     disk = Disk(STORE / f"{name}.ext4", STORE / "kernel", STORE / "initramfs")
