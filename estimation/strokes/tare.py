@@ -8,7 +8,7 @@ the pose. Part of it falls off on the way down: in one log 1.28 N at the end of 
 The memory fades: a mean over about the last MEMORY distinct samples.
 """
 
-from math import hypot, sqrt
+from math import hypot, isfinite, sqrt
 from typing import NamedTuple
 
 from control.records import UNKNOWN
@@ -16,7 +16,7 @@ from control.records import UNKNOWN
 CREEP_N = 0.05  # by which the weight may change from the end of the swing to the mud
 SHAKEN_FRACTION = 0.4  # of the weight, which may fall off on the way down
 MEMORY = 40  # samples: a tenth of a second at 380 Hz, half a second with slow messages
-UNSEEN_N = 0.5  # by which it may change over a swing that is not in the air
+UNSEEN_N = 0.5  # by which it may change over a swing that is not in the air; its size before any air is seen
 FEWEST = 5  # samples of a new zero; with fewer the one before stays
 
 
@@ -57,7 +57,7 @@ class Tare:
             self.zero = Zero(self._weight, std_error_n)
             self.drift_n = self._weight - self._before_n
             self._before_n = self._weight
-        elif not is_air:
+        elif not is_air or not isfinite(self._before_n):
             self.zero = self.zero._replace(std_error_n=hypot(self.zero.std_error_n, UNSEEN_N))
         self._reset_mean()
 

@@ -121,8 +121,15 @@ def test_a_reset_forgets_the_zero_and_what_is_gathered() -> None:
     tare = taken(swing(), WEIGHT_N)
     hang(tare, swing(), 5.0)
     tare.reset()
-    assert tare.zero == again(tare, [], 0.0).zero == Zero()
+    assert tare.zero == Zero()
     assert not isfinite(tare.drift_n)
+
+
+@pytest.mark.parametrize("count", range(FEWEST))
+def test_a_log_that_begins_in_the_mud_does_not_know_the_weight(count: int) -> None:
+    tare = again(Tare(), swing()[:count], WEIGHT_N)
+    assert tare.zero == Zero(0.0, UNSEEN_N)
+    assert again(tare, swing(), WEIGHT_N).zero.std_error_n == pytest.approx(0.0, abs=1e-9)
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 0.2), st.floats()), max_size=20), st.floats(), st.floats(1e-6, inf))
