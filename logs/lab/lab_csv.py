@@ -28,7 +28,7 @@ from logs.lab.findings import Finding, FindingKind
 from logs.lab.joint_signs import orient
 from logs.lab.log_rows import LogRows
 from logs.lab.row_order import drop_backward_rows
-from logs.lab.signal_checks import AT_PEAK, check_ranges, check_swapped_joints, drop_stuck_signals
+from logs.lab.signal_checks import AT_PEAK, CLEAR_TRAVEL_RAD, check_ranges, check_swapped_joints, drop_stuck_signals
 from logs.lab.zero_checks import check_zero
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,8 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     _refuse_missing(path, table)
     rows = LogRows(path, table.column[TIME], table.line, _read_phases(path, table), table.findings)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
-    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
+    travel_rad = np.nanmax(angle_rad, axis=0, initial=-math.inf) - np.nanmin(angle_rad, axis=0, initial=math.inf)
+    joint_moved = travel_rad > CLEAR_TRAVEL_RAD
     moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
     absent = np.repeat([not moved[name] for name in FLIPPERS], 2)
     angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors

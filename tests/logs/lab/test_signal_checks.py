@@ -120,6 +120,14 @@ def test_a_good_log_has_no_findings(change: Change, tmp_path: Path) -> None:
     assert log.findings == () and not np.isnan(log.angle_rad).any()
 
 
+def test_a_flipper_that_hangs_idle_is_absent_though_its_encoder_flickers(tmp_path: Path) -> None:
+    columns = lab_columns()
+    for joint in JOINTS[:2]:
+        columns[f"{joint}_pos"] = 0.02 + np.resize([0.0, 3e-6], len(columns["time"]))
+    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    assert log.flippers == ("right",) and np.isnan(log.angle_rad[:, :2]).all()
+
+
 def test_a_depth_beyond_the_command_is_reported(tmp_path: Path) -> None:
     columns = lab_columns()
     columns["insertiondepth"] = np.full(len(columns["time"]), 0.005)
