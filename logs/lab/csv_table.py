@@ -30,6 +30,7 @@ TEXT_SETTINGS = ("scenario", "real_time_plot")
 USED_SETTINGS = ("lateral_angle_range", "insertion_angle")  # reported as missing where a log has no settings at all
 GZIP_MAGIC = b"\x1f\x8b"
 NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?|nan|inf(?:inity)?)\s*", re.IGNORECASE)
+HELD_S = 0.05  # an empty cell has the value before: a table joined from several messages has a row for each of them
 MOST_DROPPED = 0.5  # of the rows; a file of which less is left is not such a log
 
 Cells = list[str]
@@ -186,7 +187,8 @@ def _report_empty(table: CsvTable, name: str, empty: NDArray[np.bool_], kind: Fi
     if not np.any(empty):
         return
     rows, first = int(np.count_nonzero(empty)), int(np.argmax(empty))
-    consequence = "dropped" if kind is FindingKind.ROW_DROPPED else "without this value"
+    held = f"the value before stays for {1e3 * HELD_S:.0f} ms, and then there is none"
+    consequence = "dropped" if kind is FindingKind.ROW_DROPPED else held
     text = f"no number in {rows} row{'s' * (rows > 1)}: {consequence}"
     time_s, line = float(table.column[TIME][first]), int(table.line[first])
     table.findings.append(Finding(kind, name, time_s, line, text))

@@ -23,7 +23,7 @@ from logs.lab.columns import (
     POSITION_COLUMNS,
     READ_COLUMNS,
 )
-from logs.lab.csv_table import STATE, TIME, CsvTable, read_table
+from logs.lab.csv_table import HELD_S, STATE, TIME, CsvTable, read_table
 from logs.lab.findings import Finding, FindingKind
 from logs.lab.joint_signs import orient
 from logs.lab.log_rows import LogRows
@@ -69,7 +69,7 @@ def is_lab_csv(path: Path) -> bool:
 
 def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     """Read a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
-    table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
+    table = _hold(drop_backward_rows(path, read_table(path, READ_COLUMNS)))
     _refuse_missing(path, table)
     rows = LogRows(path, table.column[TIME], table.line, _read_phases(path, table), table.findings)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
@@ -101,6 +101,16 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
         missing_settings=table.missing_settings,
         findings=tuple(rows.findings),
     )
+
+
+def _hold(table: CsvTable) -> CsvTable:
+    """Keep each value through the empty cells of the next HELD_S."""
+    time_s, rows = table.column[TIME], np.arange(len(table.line))
+    column = {}
+    for name, values in table.column.items():
+        last = np.maximum.accumulate(np.where(np.isnan(values), 0, rows))
+        column[name] = np.where(time_s - time_s[last] < HELD_S, values[last], values)
+    return table._replace(column=column)
 
 
 def _refuse_missing(path: Path, table: CsvTable) -> None:

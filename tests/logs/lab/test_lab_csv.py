@@ -21,7 +21,10 @@ from logs.files.tick_array import tick_type
 from logs.lab.export import write_lab_csv
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import LabLog, read_lab_csv
+from logs.replay import replay_files
 from tests.folders import SHARED_DATA
+from tests.lab_logs import JOINTS as LAB_JOINTS
+from tests.lab_logs import lab_columns, write_lab_log
 
 MEASURED = sorted(SHARED_DATA.glob("flipper_in_mud/*.csv.gz"))
 needs_measurements = pytest.mark.skipif(not MEASURED, reason="the shared measurements are not here")
@@ -218,6 +221,27 @@ def test_rows_whose_time_runs_backward_are_dropped_and_named(tmp_path: Path) -> 
     assert log.stamp_s.tolist() in ([0.0, 0.2, 0.3, 0.4], [0.0, 0.3, 0.3, 0.4])
     (found,) = [finding for finding in log.findings if finding.kind is FindingKind.TIME]
     assert (found.column, found.time_s, found.line) == ("time", 0.2, 5)
+
+
+def test_messages_that_each_have_a_row_of_their_own_give_the_same_estimates(tmp_path: Path) -> None:
+    """A table joined from several messages has in each row the values of one of them."""
+    columns = lab_columns()
+    expected = replay_files([write_lab_log(tmp_path / "run.csv", columns)])
+    for number, joint in enumerate(LAB_JOINTS):
+        columns[f"{joint}_pos"][number // 2 :: 2] = columns[f"{joint}_curr"][number // 2 :: 2] = math.nan
+    joined = replay_files([write_lab_log(tmp_path / "run.csv", columns)])
+    assert joined.flippers == ("left", "right")
+    assert {finding.kind for finding in joined.findings} == {FindingKind.EMPTY_CELL}
+    for stride, same in zip(expected.strides, joined.strides, strict=True):
+        assert (stride.k_s.valid, stride.stance) == (same.k_s.valid, same.stance)
+        assert same.k_s.value == pytest.approx(stride.k_s.value, abs=stride.k_s.repeatability)
+
+
+def test_an_empty_cell_has_the_value_before_for_50_ms(tmp_path: Path) -> None:
+    cells = {0.0: "", 0.01: "0.1", 0.02: "", 0.05: "", 0.0601: "", 0.07: "0.2"}
+    log = read_lab_csv(write(tmp_path / "run.csv", HEAD, *(ROW.format(*cell) for cell in cells.items())))
+    turns = [math.nan, 0.1, 0.1, 0.1, math.nan, 0.2]
+    np.testing.assert_allclose(log.angle_rad[:, 3] / math.tau, turns)
 
 
 @pytest.mark.parametrize("state", ["9", "2.5"])
