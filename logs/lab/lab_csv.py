@@ -26,7 +26,7 @@ from logs.lab.columns import (
 from logs.lab.csv_table import HELD_S, STATE, TIME, CsvTable, read_table
 from logs.lab.findings import Finding, FindingKind
 from logs.lab.joint_signs import orient
-from logs.lab.log_rows import LogRows
+from logs.lab.log_rows import LogRows, known_range
 from logs.lab.row_order import drop_backward_rows
 from logs.lab.signal_checks import AT_PEAK, CLEAR_TRAVEL_RAD, check_ranges, check_swapped_joints, drop_stuck_signals
 from logs.lab.zero_checks import check_zero
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
-CLIPPED_ROWS = 200  # half a second of rows at the largest current makes it a limit
+CLIPPED_S = 0.5  # at the largest current make it a limit
 MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
 
 
@@ -73,13 +73,12 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     _refuse_missing(path, table)
     rows = LogRows(path, table.column[TIME], table.line, _read_phases(path, table), table.findings)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
-    travel_rad = np.nanmax(angle_rad, axis=0, initial=-math.inf) - np.nanmin(angle_rad, axis=0, initial=math.inf)
-    joint_moved = travel_rad > CLEAR_TRAVEL_RAD
+    joint_moved = known_range(angle_rad) > CLEAR_TRAVEL_RAD
     moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
     absent = np.repeat([not moved[name] for name in FLIPPERS], 2)
     angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors
     commanded_m = table.column.get(DEPTH_COLUMN, np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)))
-    current_limit_a = _find_limit_a(current_a)
+    current_limit_a = _find_limit_a(rows.time_s, current_a)
     check_ranges(rows, angle_rad, current_a)
     check_swapped_joints(rows, angle_rad)
     drop_stuck_signals(rows, angle_rad, current_a)
@@ -149,9 +148,10 @@ def _report_unknown(path: Path, table: CsvTable, known: NDArray[np.bool_]) -> No
     table.findings.append(found)
 
 
-def _find_limit_a(current_a: Floats) -> float:
-    """Return the largest current if one joint shows it in many rows: then the drive clipped it."""
+def _find_limit_a(time_s: Floats, current_a: Floats) -> float:
+    """Return the largest current if one joint shows it for CLIPPED_S: then the drive clipped it."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
     at_peak = size_a >= AT_PEAK * peak_a
-    return peak_a if peak_a > 0.0 and int(at_peak.sum(axis=0).max()) >= CLIPPED_ROWS else math.inf
+    clipped_s = np.diff(time_s) @ (at_peak[1:] & at_peak[:-1])
+    return peak_a if peak_a > 0.0 and float(clipped_s.max()) >= CLIPPED_S else math.inf

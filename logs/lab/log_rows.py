@@ -59,3 +59,9 @@ def steps_inside(phase: Integers, wanted: Phase) -> Truths:
     """Return which steps from one row to the next begin and end in a phase."""
     inside: Truths = (phase[1:] == wanted) & (phase[:-1] == wanted)
     return inside
+
+
+def known_range(values: Floats) -> Floats:
+    """Return the range of each signal where it is known; negative where it never is."""
+    size: Floats = np.nanmax(values, axis=0, initial=-np.inf) - np.nanmin(values, axis=0, initial=np.inf)
+    return size

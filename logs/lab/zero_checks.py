@@ -13,7 +13,7 @@ from control.geometry import FlipperGeometry
 from control.records import FLIPPERS, Phase
 from logs.lab.columns import POSITION_COLUMNS
 from logs.lab.findings import FindingKind
-from logs.lab.log_rows import LogRows
+from logs.lab.log_rows import LogRows, known_range
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ DEPTH_TOLERANCE_M = 0.015  # the edge's height with the arm level: a zero that d
 HIGHEST_SWING_M = 0.030  # above the surface, twice the height with the arm level
 LEAST_DEPTH_FRACTION = 1.0 / 3.0  # of the commanded depth; stiff mud and a weak motor reach two thirds
 EXTRACTION_HEIGHT_M = 0.03  # above the level arm's edge, in logs that do not have the setting; the authors' largest
-SHORTEST_ROWS = 20  # of a swing
+SHORTEST_S = 0.05  # of a swing
 
 
 class Excursion(NamedTuple):
@@ -61,9 +61,8 @@ def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_
     """Return the excursion of a flipper that swung and pushed; None for one that did not."""
     depth_m = edge_depth_m(sweep_rad, adduction_rad)
     pushing = np.isin(rows.phase, (Phase.INSERTION, Phase.STANCE)) & np.isfinite(depth_m)
-    swings = [
-        each for each in rows.strokes(Phase.SWING) if np.count_nonzero(np.isfinite(depth_m[each])) > SHORTEST_ROWS
-    ]
+    known_s = np.where(np.isfinite(depth_m), rows.time_s, np.nan)
+    swings = [each for each in rows.strokes(Phase.SWING) if known_range(known_s[each]) > SHORTEST_S]
     if not np.any(pushing) or not swings:
         return None
     medians_m = [float(np.nanmedian(depth_m[each])) for each in swings]

@@ -128,6 +128,17 @@ def test_a_flipper_that_hangs_idle_is_absent_though_its_encoder_flickers(tmp_pat
     assert log.flippers == ("right",) and np.isnan(log.angle_rad[:, :2]).all()
 
 
+@pytest.mark.parametrize("every", [1, 10])
+def test_the_limit_and_the_zero_are_found_at_any_rate_of_rows(every: int, tmp_path: Path) -> None:
+    columns = lab_columns()
+    saturated(columns)
+    columns = {name: values[::every] for name, values in columns.items()}
+    assert read_lab_csv(write_lab_log(tmp_path / "run.csv", columns)).current_limit_a == 6.0
+    shifted(-0.05)(columns)
+    with pytest.raises(LogError, match="below the surface in every swing"):
+        read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+
+
 def test_a_depth_beyond_the_command_is_reported(tmp_path: Path) -> None:
     columns = lab_columns()
     columns["insertiondepth"] = np.full(len(columns["time"]), 0.005)
