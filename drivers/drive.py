@@ -66,8 +66,13 @@ class DriveParameters:
 
     @property
     def fastest_rad_s(self) -> float:
-        """Return the speed at which the motor's voltage is used up, as far as its protocol tells."""
+        """Return the speed up to which the motor can give the commanded torque, as far as its protocol tells."""
         return inf
+
+    @property
+    def torque_step_nm(self) -> float:
+        """Return the step between two codes of a commanded torque, of which the nearest is sent."""
+        return 0.0
 
     @property
     def reports_settings(self) -> bool:

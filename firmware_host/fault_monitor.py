@@ -12,7 +12,7 @@ from control.joint_friction import NO_FRICTION
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
-from control.monitors.torque_gain_monitor import FlipperStrokes, TorqueGainMonitor
+from control.monitors.torque_gain_monitor import FlipperStrokes, TorqueGainMonitor, WatchedJoint
 from control.monitors.zero_monitor import ZeroMonitor
 from control.rate import PERIOD_S
 from control.records import (
@@ -317,6 +317,7 @@ def _joint_monitors(configuration: Configuration) -> tuple[JointMonitor, ...]:
             drives[joint].heartbeat_period_s,
             own_dynamics,
             drives[joint].answers_only,
+            drives[joint].fastest_rad_s,
         )
         for joint, joint_range, own_dynamics in zip(configuration.rig.joints, ranges, dynamics, strict=True)
     )
@@ -329,16 +330,15 @@ def _gain_monitor(configuration: Configuration) -> TorqueGainMonitor:
     flippers = []
     for flipper in rig.flippers:
         own = rig.joints_of(flipper)
-        joints = rig.joints[own]
-        flippers.append(
-            FlipperStrokes(
-                own.start,
-                joints,
-                configuration.geometry,
-                configuration.arm,
-                [frictions.get(joint, NO_FRICTION) for joint in joints],
-                [drives[joint].answers_only for joint in joints],
-                [drives[joint].fastest_rad_s for joint in joints],
+        joints = [
+            WatchedJoint(
+                name=joint,
+                friction=frictions.get(joint, NO_FRICTION),
+                answers_only=drives[joint].answers_only,
+                fastest_rad_s=drives[joint].fastest_rad_s,
+                torque_step_nm=drives[joint].torque_step_nm,
             )
-        )
+            for joint in rig.joints[own]
+        ]
+        flippers.append(FlipperStrokes(own.start, joints, configuration.geometry, configuration.arm))
     return TorqueGainMonitor(flippers)

@@ -32,9 +32,11 @@ YIELDS_S = 0.01  # after that: an answer is a tick older than its torque, and te
 class EncoderMonitor:
     """Owns the last message, and the integral of the velocity since the angle last changed."""
 
-    def __init__(self, joint: str, jump_rad: float) -> None:
+    def __init__(self, joint: str, jump_rad: float, fastest_rad_s: float = inf) -> None:
+        """`fastest_rad_s`: up to which the drive reports its speed."""
         self._joint = joint
         self._jump_rad = jump_rad
+        self._fastest_rad_s = fastest_rad_s
         self._speed = SpeedMonitor(joint)
         self.reset()
 
@@ -91,6 +93,8 @@ class EncoderMonitor:
                 self._reset_frozen()
         if gap_s > PUNCTUAL_S:
             self._begin_interval(after_s=INTERVAL_S)  # the messages that were held up come in a burst
+        elif abs(velocity_rad_s) > self._fastest_rad_s:
+            self._begin_interval(after_s=PUNCTUAL_S)  # nor does this speed count in the mean with the next one
         elif not fault and gap_s > 0.0:
             self._interval_s += gap_s
             if self._interval_s > 0.0:

@@ -4,7 +4,7 @@
 a single sample cannot show. Bounds that depend on the machine are in FaultBounds, all others are constants here.
 """
 
-from math import copysign, degrees, isfinite, radians
+from math import copysign, degrees, inf, isfinite, radians
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -61,8 +61,12 @@ class JointMonitor:
         heartbeat_period_s: float = 0.1,
         dynamics: JointDynamics = JointDynamics(),  # noqa: B008 - immutable
         answers_only: bool = False,
+        fastest_rad_s: float = inf,
     ) -> None:
-        """`answers_only`: the drive sends nothing unless it is asked, so it is not silent while no tick asks."""
+        """`answers_only`: the drive sends nothing unless it is asked, so it is not silent while no tick asks.
+
+        `fastest_rad_s`: up to which the motor can give the commanded torque, and the drive reports its speed.
+        """
         self.joint = joint
         self._answers_only = answers_only
         self.winding = Winding(winding)
@@ -72,7 +76,8 @@ class JointMonitor:
         self._low_rad = span.min_rad - radians(limits.position_margin_deg)
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
-        self._encoder = EncoderMonitor(joint, bounds.jump_rad)
+        self._fastest_rad_s = fastest_rad_s
+        self._encoder = EncoderMonitor(joint, bounds.jump_rad, fastest_rad_s)
         self.motion = MotionMonitor(joint, dynamics, limits.torque_nm)
         self._stillness = Stillness(STILL_RAD)
         self._most_a = CURRENT_FRACTION * current_limit_a
@@ -251,7 +256,9 @@ class JointMonitor:
         if self._current_ticks >= CURRENT_TICKS:
             found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
         measured_nm = current_a * self._constant_nm_a
-        differs = abs(torque_nm - measured_nm) > self._missing_nm
+        differs = (
+            abs(torque_nm - measured_nm) > self._missing_nm and not abs(state.velocity_rad_s) > self._fastest_rad_s
+        )
         self._missing_s = self._missing_s + seen_s if differs and facts.moving else 0.0
         if self._missing_s > MISSING_S:  # a frozen current, lost commands, a silent clamp
             kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]

@@ -21,10 +21,11 @@ a belt moves alone, up to three times as easily as its joint, and then hits it: 
 whole joint. So a sweep is too strong only over three blocks together, 32 ms, as long as a torque of 6 mN·m needs to
 cross 1 degree, and without the last three of a stroke, which may end before the hit. What is left may vary too little
 to show a gain, so the single blocks must agree. A sweep that the mud lets go of is thrown through that play, so no
-block counts that is faster than any path, or nearly as fast as its motor can turn, which then gives no torque. A thrown
-sweep is braked from the beginning, while mud may still push its flipper: it brakes as one with a weak motor would, so a
-sweep is too weak only if its stroke without these blocks says the same. One stride proves a gain beyond a factor of 2,
-three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+block counts that is faster than any path, or so fast that its motor gives no torque any more. A thrown sweep is braked
+from the beginning, while mud may still push its flipper: it brakes as one with a weak motor would, so a sweep is too
+weak only if its stroke without these blocks says the same. A torque whose changes are as small as a step of its code
+proves nothing. One stride proves a gain beyond a factor of 2, three strides together one beyond 1.6. [arm] states the
+inertias, which must be as exact.
 
 The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
 has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
@@ -48,7 +49,6 @@ from control.records import DriveState, DriveStates, Phase, Torques
 BLOCK_TICKS = 4
 SLOW_RAD_S = 0.1  # below it dry friction has any direction
 FAST_RAD_S = 10.0  # of a joint that the mud has let go: faster than its path
-DRIVEN_FRACTION = 0.9  # of the motor's fastest speed, from which on it drives no further
 LEAST_BLOCKS = 7  # of a phase
 LEAST_NM2 = 1e-6  # of Σ u² about the mean: a torque at its limit varies by the rounding of floats
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
@@ -58,6 +58,16 @@ STRIDES = 3
 
 
 Block = tuple[float, float]  # commanded torque u, and torque m of the motion
+
+
+class WatchedJoint(NamedTuple):
+    """A joint and its drive."""
+
+    name: str
+    friction: JointFriction = NO_FRICTION
+    answers_only: bool = False  # when asked
+    fastest_rad_s: float = inf  # up to which the motor can give the commanded torque
+    torque_step_nm: float = 0.0  # between two codes of a command, of which the nearest is sent
 
 
 class Moments(NamedTuple):
@@ -112,9 +122,11 @@ class Stride(NamedTuple):
         blocks, joined, driven = self
         return Stride(blocks.plus(other.blocks), joined.plus(other.joined), driven.plus(other.driven))
 
-    def gain_beyond(self, factor: float) -> float | None:
-        """Return the gain, if it is certainly beyond this factor or its inverse."""
+    def gain_beyond(self, factor: float, torque_step_nm: float = 0.0) -> float | None:
+        """Return the gain, if it is certainly beyond this factor or its inverse. A code rounds by step² / 12."""
         blocks, joined, driven = self
+        if blocks.uu < blocks.blocks * torque_step_nm * torque_step_nm:
+            return None
         if joined.is_line and joined.um > factor * joined.uu and blocks.um > factor * blocks.uu:
             return joined.gain
         is_weak = all(each.is_line and factor * each.mm < each.um for each in (blocks, driven))
@@ -124,14 +136,11 @@ class Stride(NamedTuple):
 class JointStrokes:
     """Owns the sums of one joint: of the stroke under way, of the stride under way, and of the last strides."""
 
-    def __init__(
-        self, joint: str, inertia_kg_m2: float, friction: JointFriction, joins: int, fastest_rad_s: float = inf
-    ) -> None:
-        """`fastest_rad_s`: the speed at which the motor's voltage is used up."""
+    def __init__(self, joint: WatchedJoint, inertia_kg_m2: float, joins: int) -> None:
         self.joint = joint
-        self._fast_rad_s = min(FAST_RAD_S, DRIVEN_FRACTION * fastest_rad_s)
+        self._fast_rad_s = min(FAST_RAD_S, joint.fastest_rad_s)
         self.inertia_kg_m2 = inertia_kg_m2
-        self.friction = None if friction == NO_FRICTION else friction
+        self.friction = None if joint.friction == NO_FRICTION else joint.friction
         self._joins = joins
         self._stroke: list[Block] = []
         self._braked = 0  # blocks at its beginning: the mud has thrown the joint
@@ -183,36 +192,29 @@ class JointStrokes:
     def fault_of(self, stride: Stride) -> Fault | None:
         """Return a fault if this stride, or the last three, prove a wrong gain."""
         self._strides.append(stride)
-        gain = stride.gain_beyond(FACTOR_OF_ONE)
+        step_nm = self.joint.torque_step_nm
+        gain = stride.gain_beyond(FACTOR_OF_ONE, step_nm)
         if gain is None and len(self._strides) == STRIDES:
             first, second, third = self._strides
-            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE)
+            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE, step_nm)
         if gain is None:
             return None
         self._strides.clear()
-        return FaultKind.TORQUE_GAIN.fault(self.joint, gain=gain, most=FACTOR_OF_THREE)
+        return FaultKind.TORQUE_GAIN.fault(self.joint.name, gain=gain, most=FACTOR_OF_THREE)
 
 
 class FlipperStrokes:
     """Owns the block under way of one flipper, and its joint that this phase watches."""
 
-    def __init__(
-        self,
-        first: int,
-        joints: Sequence[str],
-        geometry: FlipperGeometry,
-        mass: ArmMass,
-        frictions: Sequence[JointFriction],
-        asked: Sequence[bool],
-        fastest_rad_s: Sequence[float] = (inf, inf),
-    ) -> None:
-        """`first`: of the flipper's joints among all. `asked`: of each, whether its drive answers only when asked."""
+    def __init__(self, first: int, joints: Sequence[WatchedJoint], geometry: FlipperGeometry, mass: ArmMass) -> None:
+        """`first`: of the flipper's joints among all."""
         self._first = self._watched = first
         self._geometry, self._mass = geometry, mass
-        self._commands = [slice(0, BLOCK_TICKS) if each else slice(1, BLOCK_TICKS + 1) for each in asked]
+        self._commands = [
+            slice(0, BLOCK_TICKS) if joint.answers_only else slice(1, BLOCK_TICKS + 1) for joint in joints
+        ]
         inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
-        joins = (JOINED_BLOCKS, 1)
-        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions, joins, fastest_rad_s)
+        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, (JOINED_BLOCKS, 1))
         self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
         self._joint: JointStrokes | None = None  # that this phase watches
         self._swung_in_air = False

@@ -36,8 +36,10 @@ class MitAxis(AnsweringAxis):
     settings: MitSettings
 
     def __init__(self, joint: str, parameters: MitParameters, outlet: Outlet) -> None:
-        tolerance_nm = TOLERANCE_NM + parameters.ranges.torque_step_nm
-        setpoints = SetpointMonitor(parameters.command_delay_s, tolerance_nm=tolerance_nm, measured=True)
+        tolerance_nm = TOLERANCE_NM + parameters.torque_step_nm
+        setpoints = SetpointMonitor(
+            parameters.command_delay_s, parameters.fastest_rad_s / TURN_RAD, tolerance_nm=tolerance_nm, measured=True
+        )
         super().__init__(joint, parameters.sign, outlet, setpoints)
         self.parameters = parameters
         self._ranges = parameters.ranges

@@ -37,5 +37,5 @@ def gate_table(drive: MitParameters) -> GateTable:
         while_open={node_id: frozenset({codec.ENTER})},
         questions=questions,
         idle=codec.LEAVE,
-        torque_step_nm=ranges.torque_step_nm,
+        torque_step_nm=drive.torque_step_nm,
     )

@@ -11,6 +11,7 @@ from drivers.mit.models import MODELS, Model
 
 LARGEST_ID = 15  # an answer has four bits for it
 AS_DELIVERED = -1.0
+DRIVEN_FRACTION = 0.9  # of the range of the velocity, which makers choose as the speed at which the voltage is used up
 SMALLEST_RAD_S, LARGEST_RAD_S = 1.0, 500.0  # the 12 bits of a velocity then have steps of 0.5 mrad/s to 0.24 rad/s
 
 
@@ -57,7 +58,11 @@ class MitParameters(DriveParameters):
 
     @property
     def fastest_rad_s(self) -> float:
-        return self.ranges.velocity_rad_s
+        return DRIVEN_FRACTION * self.ranges.velocity_rad_s
+
+    @property
+    def torque_step_nm(self) -> float:
+        return self.ranges.torque_step_nm
 
     @property
     def reports_settings(self) -> bool:

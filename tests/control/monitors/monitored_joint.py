@@ -1,6 +1,6 @@
 """A healthy joint, its monitor and one tick of it, for the tests of a joint's faults."""
 
-from math import radians
+from math import inf, radians
 from typing import Any
 
 from control.faults import Fault
@@ -20,10 +20,10 @@ SPAN = JointRange(radians(-60.0), radians(60.0))
 
 
 def make_monitor(
-    bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS, answers_only: bool = False
+    bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS, answers_only: bool = False, fastest_rad_s: float = inf
 ) -> JointMonitor:
     drive = (WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
-    return JointMonitor(JOINT, limits, SPAN, bounds, *drive, answers_only=answers_only)
+    return JointMonitor(JOINT, limits, SPAN, bounds, *drive, answers_only=answers_only, fastest_rad_s=fastest_rad_s)
 
 
 def healthy(now_s: float = NOW_S, **changes: Any) -> DriveState:

@@ -4,7 +4,7 @@ Bounds are pinned from both sides with figures instead of the module's own const
 """
 
 from collections.abc import Callable, Iterable
-from itertools import repeat
+from itertools import accumulate, repeat
 from math import cos, inf, nextafter, pi, sin
 from random import Random
 
@@ -249,6 +249,19 @@ def test_the_path_over_a_gap_is_no_slip(gap_s: float, slips: bool) -> None:
     after = [(gap_s + number * MESSAGE_S, 0.2 + COUNT_RAD * (number % 2), 0.0) for number in range(150)]
     names = found([*before, *after], EncoderMonitor("left_sweep", 0.5))
     assert ("encoder_slips" in names) == slips
+
+
+@pytest.mark.parametrize(("fastest_rad_s", "slips"), [(inf, True), (9.0, False)])
+def test_the_path_of_a_joint_that_is_faster_than_its_drive_can_report_is_no_slip(
+    fastest_rad_s: float, slips: bool
+) -> None:
+    """Speeds that end at 10 rad/s: in every stride the mud throws the joint forth at 12 rad/s, and it returns."""
+    speeds_rad_s = ([1.0] * 30 + [12.0] * 30 + [-2.0] * 195) * 6
+    angles_rad = accumulate(speed_rad_s * MESSAGE_S for speed_rad_s in speeds_rad_s)
+    reported = [min(speed_rad_s, 10.0) for speed_rad_s in speeds_rad_s]
+    encoder = EncoderMonitor("left_sweep", 0.5, fastest_rad_s)
+    names = found(messages(zip(angles_rad, reported, strict=True)), encoder)
+    assert ("encoder_slips" in names) == slips and set(names) <= {"", "encoder_slips"}
 
 
 @pytest.mark.parametrize("forget", [EncoderMonitor.reset, EncoderMonitor.release])

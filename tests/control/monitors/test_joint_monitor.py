@@ -16,7 +16,7 @@ from control.monitors.joint_monitor import JointMonitor, TickFacts
 from control.parameters.fault_bounds import FaultBounds
 from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
-from control.records import DriveState
+from control.records import UNKNOWN, DriveState
 from tests.control.monitors.monitored_joint import (
     BOUNDS,
     CURRENT_LIMIT_A,
@@ -144,6 +144,15 @@ def test_a_joint_within_its_bounds_has_no_fault(state: Changes, tick: Changes, l
 def test_a_milder_bound_that_is_passed_is_the_only_fault(state: Changes, expected: str) -> None:
     monitor = make_monitor()
     assert {name for _ in range(60) for name in names_of(monitor, healthy(**state))} == {expected}
+
+
+@pytest.mark.parametrize(
+    ("velocity_rad_s", "expected"),
+    [(9.1, set()), (-9.1, set()), (9.0, {"torque_missing"}), (UNKNOWN, {"torque_missing"})],
+)
+def test_torque_is_not_missing_where_the_motor_s_voltage_is_used_up(velocity_rad_s: float, expected: set[str]) -> None:
+    monitor, state = make_monitor(fastest_rad_s=9.0), healthy(velocity_rad_s=velocity_rad_s)
+    assert {name for _ in range(60) for name in names_of(monitor, state, **pushed(0.5))} == expected
 
 
 @pytest.mark.parametrize(

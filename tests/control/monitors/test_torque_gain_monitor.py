@@ -6,7 +6,6 @@ import pytest
 
 from control.faults import Fault
 from control.geometry import FlipperGeometry
-from control.joint_friction import NO_FRICTION
 from control.monitors.torque_gain_monitor import (
     BLOCK_TICKS,
     FACTOR_OF_ONE,
@@ -17,6 +16,7 @@ from control.monitors.torque_gain_monitor import (
     Moments,
     Stride,
     TorqueGainMonitor,
+    WatchedJoint,
 )
 from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
@@ -27,7 +27,7 @@ INERTIA_KG_M2 = 0.0004
 
 def stride_of(speeds_rad_s: list[float], torques_nm: list[float], fastest_rad_s: float = inf) -> Stride:
     """Return the sums of a stroke: torques of blocks, and the speeds between them."""
-    strokes = JointStrokes("left_sweep", INERTIA_KG_M2, NO_FRICTION, JOINED_BLOCKS, fastest_rad_s)
+    strokes = JointStrokes(WatchedJoint("left_sweep", fastest_rad_s=fastest_rad_s), INERTIA_KG_M2, JOINED_BLOCKS)
     states = [DriveState(0.0, each, 1.0 + n * BLOCK_TICKS * PERIOD_S) for n, each in enumerate(speeds_rad_s)]
     for before, after, torque_nm in zip(states, states[1:], torques_nm, strict=False):
         strokes.add(before, after, torque_nm, 0.0)
@@ -40,6 +40,15 @@ def test_a_torque_that_stays_at_its_limit_shows_no_gain(uu: float) -> None:
     """A joint that lies at its stop: the sums about the mean are the rounding of floats, of either sign."""
     assert not Moments(blocks=9, uu=uu, um=1e-17, mm=0.1).is_line
     assert not Moments(blocks=9, uu=uu, um=1e-17, mm=1e-18).is_line
+
+
+@pytest.mark.parametrize(("torque_step_nm", "is_wrong"), [(0.0, True), (0.017, True), (0.019, False)])
+def test_a_torque_that_changes_by_less_than_a_step_of_its_code_shows_no_gain(
+    torque_step_nm: float, is_wrong: bool
+) -> None:
+    """Of an AK80-64, whose steps of 0.07 N·m are as large as the torque of a whole insertion."""
+    moments = Moments(blocks=9, uu=0.0032, um=0.00053, mm=0.00013)
+    assert (Stride(moments, moments, moments).gain_beyond(FACTOR_OF_ONE, torque_step_nm) is not None) == is_wrong
 
 
 def test_a_motion_whose_square_underflows_raises_nothing() -> None:
@@ -59,7 +68,7 @@ def test_a_joint_that_the_mud_lets_go_of_shows_no_gain_while_it_is_faster_than_a
     assert fast.gain_beyond(FACTOR_OF_ONE) is None
 
 
-@pytest.mark.parametrize(("fastest_rad_s", "is_weak"), [(inf, True), (10.0, False), (8.0, False)])
+@pytest.mark.parametrize(("fastest_rad_s", "is_weak"), [(inf, True), (9.0, False), (7.2, False)])
 def test_a_motor_that_has_used_up_its_voltage_shows_no_gain(fastest_rad_s: float, is_weak: bool) -> None:
     """Of a DM4340P, whose speeds end at 10 rad/s: the mud throws the sweep, and full torque drives it no further."""
     speeds_rad_s = [-9.97, -9.97, -9.97, -9.97, -4.09, 7.63, 6.83, 2.18, 1.27, 2.84, 3.56, 3.36, 2.88]
@@ -140,10 +149,8 @@ def test_a_stroke_that_is_too_short_to_cross_a_play_counts_for_a_weak_motor_only
 def monitor_of(*asked: bool) -> TorqueGainMonitor:
     """Return the monitor of a flipper without weight and friction."""
     weightless = ArmMass(arm_mass_kg=0.0, sweep_inertia_kg_m2=INERTIA_KG_M2, adduction_inertia_kg_m2=INERTIA_KG_M2)
-    frictions = (NO_FRICTION, NO_FRICTION)
-    return TorqueGainMonitor(
-        [FlipperStrokes(0, ("left_sweep", "left_adduction"), FlipperGeometry(), weightless, frictions, asked)]
-    )
+    joints = [WatchedJoint(name, answers_only=each) for name, each in zip(("sweep", "adduction"), asked, strict=True)]
+    return TorqueGainMonitor([FlipperStrokes(0, joints, FlipperGeometry(), weightless)])
 
 
 @pytest.mark.parametrize("asked", [(False, False), (False, True), (True, False), (True, True)])

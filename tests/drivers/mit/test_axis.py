@@ -194,11 +194,27 @@ def test_errors_of_a_damiao_are_cleared_and_those_of_a_cubemars_only_end() -> No
         assert bench.last == data
 
 
-def run_following(bench: Bench, commanded_nm: float, measured_nm: float, ticks: int) -> None:
+def run_following(
+    bench: Bench, commanded_nm: float, measured_nm: float, ticks: int, velocity_rad_s: float = 0.0
+) -> None:
     """Command a torque in every tick; the drive measures another one in every second answer."""
     for tick in range(ticks):
         bench.axis.send_torque(commanded_nm)
-        bench.answer(codec.ENABLED, torque_nm=measured_nm if tick % 2 else commanded_nm)
+        torque_nm = measured_nm if tick % 2 else commanded_nm
+        bench.answer(codec.ENABLED, torque_nm=torque_nm, velocity_rad_s=velocity_rad_s)
+
+
+@pytest.mark.parametrize(
+    ("velocity_rad_s", "commanded_nm", "is_clamped"),
+    [(9.0, 0.5, True), (-9.0, -0.5, True), (5.0, 0.5, False), (9.0, -0.5, False)],
+)
+def test_a_motor_whose_voltage_is_used_up_gives_less_torque_than_commanded(
+    velocity_rad_s: float, commanded_nm: float, is_clamped: bool
+) -> None:
+    bench = Bench("DM4340P")  # whose speeds end at 10 rad/s
+    bench.enter()
+    run_following(bench, commanded_nm, 0.0, 40, velocity_rad_s)
+    assert (bench.axis.health.setpoint_problem == "") == is_clamped
 
 
 def test_a_torque_that_was_not_commanded_again_and_again_is_another_program_s() -> None:
