@@ -92,8 +92,12 @@ class EnergyBounds:
         return found_j + self.torque_nm * self.speed_rad_s * 2 * DELAY_TICKS * PERIOD_S
 
     def walking_j(self, duration_s: float) -> float:
-        """Return the bound of a robot that walks on for this time, 0 for one that holds a pose."""
-        path_rad = min(self.speed_rad_s * duration_s, self.gait_rad(duration_s))
+        """Return the bound of a robot that walks on for this time, 0 for one that holds a pose.
+
+        A joint whose encoder fails is not seen to be too fast: full torque may accelerate it.
+        """
+        faster_rad_s = 0.5 * self.torque_nm / self.inertia_kg_m2 * duration_s
+        path_rad = min((self.speed_rad_s + faster_rad_s) * duration_s, self.gait_rad(duration_s))
         return self.kinetic_j + self.torque_nm * path_rad
 
 
