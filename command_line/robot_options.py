@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
-from command_line.shared_options import DEFAULT_CONFIG, service_or_simulated
+from command_line.shared_options import DEFAULT_CONFIG
 from drivers.can.can_port import interface_problem
 from experiments.study.option import Option, OptionError
+from operator_client.default_paths import service_or_simulated
 
 
 def default_configuration() -> Path:

@@ -10,12 +10,13 @@ from typing import Annotated
 from command_line import exit_codes
 from command_line.errors import CommandError, usage_error
 from command_line.screen import complain
-from command_line.shared_options import SIMULATED, Seed
+from command_line.shared_options import Seed
 from drivers.can.bus_lock import BusRole, bus_owner
 from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 from firmware_host.configuration.toml_records import read_text
+from operator_client.default_paths import SIMULATED
 from simulation.harness import peer
 from simulation.harness.local_setup import configuration_text, local_copy, make_buses, named_folder, write_local_setup
 from simulation.harness.world import load_world

@@ -10,12 +10,10 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 os.environ.pop("MUDSKIPPER_SOCKET", None)  # a default of the command line, which the pages show
 
-from command_line import shared_options  # noqa: E402 - it needs the path above
 from docs.generate.pages import write_tables  # noqa: E402 - it needs the path above
 from verification.claims.pages import fill  # noqa: E402
 from verification.claims.results import load_results  # noqa: E402
 
-shared_options.find_run_folder = lambda: None  # type: ignore[attr-defined]  # and so is a robot that is simulated on this computer
 write_tables(DOCS / "reference" / "generated")
 
 project = "mudskipper"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,8 +9,8 @@ from types import TracebackType
 from typing import Any
 
 from control.modes import ENERGISED, Mode
-from firmware_host.configuration.configuration import StatusParameters
 from mudskipper.ground_and_gait import Gait
+from operator_client.default_paths import default_socket
 from operator_client.status_client import StatusClient
 
 POLL_S = 0.05
@@ -29,9 +28,8 @@ class Client:
     """
 
     def __init__(self, socket: str | Path | None = None, lease_s: float = 0.0) -> None:
-        """`socket`: the environment's MUDSKIPPER_SOCKET where it is not given, or else the default path."""
-        path = socket or os.environ.get("MUDSKIPPER_SOCKET") or StatusParameters().socket
-        self._client = StatusClient(Path(path))
+        """Without `socket` it is $MUDSKIPPER_SOCKET, else that of the service or of the simulated robot."""
+        self._client = StatusClient(Path(socket or default_socket()))
         self._lease = {"lease_s": lease_s} if lease_s else {}
         self._leased = False
 

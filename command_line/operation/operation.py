@@ -15,12 +15,13 @@ from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, Report
 from command_line.screen import MARKS, coloured, complain
-from command_line.shared_options import DEFAULT_CONFIG, SIMULATED, Json, Socket
+from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
 from control.computing.suggestion import suggestion
 from control.records import JOINTS
 from drivers.can.run_folder import find_run_folder
 from experiments.study.option import Option
 from firmware_host.sockets.rpc import LONGEST_ARRAY
+from operator_client.default_paths import SIMULATED
 from operator_client.status_client import CallRefusedError, DroppedError, NoDaemonError, StatusClient
 
 ARMING_S = 5.0

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
+import mudskipper
 from command_line import exit_codes
-from command_line import shared_options as shared
 from command_line.main import main
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import load_configuration, parse_configuration
+from operator_client import default_paths
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.blocks import RESTING_RAD
@@ -137,7 +138,7 @@ def test_any_configuration_is_simulated_on_local_buses(
     text += '[emergency_stop]\nsource = "gpio"\ndevice = "/dev/gpiochip0"\n'
     Path("robot.toml").write_text(text.replace('"socketcan"', '"kvaser"'), encoding="utf-8")
     assert main(["simulate", "--config", "robot.toml", "--local"]) == exit_codes.OK
-    path = named_folder(shared.SIMULATED) / "mudskipper.toml"
+    path = named_folder(default_paths.SIMULATED) / "mudskipper.toml"
     assert f"mudskipperd --config {path}" in capsys.readouterr().out
     local, robot = load_configuration(path), parse_configuration(calibrated(text))
     assert {bus.interface for bus in local.bus.values()} == {"mudskipper_local"} and not local.emergency_stop.source
@@ -204,23 +205,25 @@ def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_fil
     assert precious.read_text(encoding="utf-8") == "root's"
 
 
-def test_a_second_terminal_finds_the_simulated_robot_where_no_service_runs(
+def test_a_second_terminal_or_program_finds_the_simulated_robot_where_no_service_runs(
     short_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     runtime, service = short_folder / "run", short_folder / "service.sock"
     runtime.mkdir(mode=0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
     monkeypatch.delenv("MUDSKIPPER_SOCKET", raising=False)
-    monkeypatch.setattr(shared, "DEFAULT_SOCKET", str(service))
-    assert shared.default_socket() == str(service)
-    simulated = named_folder(shared.SIMULATED) / "mudskipper.sock"
-    monkeypatch.setattr(shared, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
+    monkeypatch.setattr(default_paths, "DEFAULT_SOCKET", str(service))
+    assert default_paths.default_socket() == str(service)
+    simulated = named_folder(default_paths.SIMULATED) / "mudskipper.sock"
+    monkeypatch.setattr(default_paths, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
     simulated.touch()
-    assert shared.default_socket() == str(simulated)
+    assert default_paths.default_socket() == str(simulated)
+    with pytest.raises(mudskipper.NoDaemonError, match=str(simulated)):
+        mudskipper.Client()
     (short_folder / "mudskipper.sock").touch()  # the socket of the service
-    assert shared.default_socket() == str(short_folder / "mudskipper.sock")
+    assert default_paths.default_socket() == str(short_folder / "mudskipper.sock")
     monkeypatch.setenv("MUDSKIPPER_SOCKET", "/given")
-    assert shared.default_socket() == "/given"
+    assert default_paths.default_socket() == "/given"
 
 
 def test_a_robot_on_its_own_buses_needs_no_folder_of_the_user(

@@ -12,13 +12,13 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from command_line.operation.confirmation import RESTING, TORQUE_UNKNOWN
-from command_line.shared_options import DEFAULT_SOCKET
 from control.modes import ENERGISED, Mode
 from firmware_host.configuration import socket_paths
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from logs.files.log_reader import read_log
 from logs.files.log_summary import log_summary
 from logs.replay import replay_files
+from operator_client.default_paths import DEFAULT_SOCKET
 from operator_client.status_client import OPERATORS
 from simulation.harness.peer import WATCHDOG_S
 from tests.command_line.command_lines import run
