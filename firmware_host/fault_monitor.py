@@ -229,8 +229,8 @@ class FaultMonitor:
 
     def _moves_in_air(self, joint: str, monitor_input: MonitorInput) -> bool:
         """Return whether no mud may hold a joint back: by the phase of the gait, and by the flipper's own angles."""
-        sweep, lift = monitor_input.states[self._rig.joints_of(joint.split("_")[0])]
-        in_mud = is_in_mud(self._geometry, sweep.angle_rad, lift.angle_rad)
+        sweep, adduction = monitor_input.states[self._rig.joints_of(joint.split("_")[0])]
+        in_mud = is_in_mud(self._geometry, sweep.angle_rad, adduction.angle_rad)
         return not in_mud and monitor_input.phase not in IN_MUD
 
     def _check_trust(self, found: list[Fault], mode: Mode) -> None:

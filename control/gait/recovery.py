@@ -98,8 +98,8 @@ class Recovery:
             return ()
         return tuple(
             flipper
-            for flipper, (sweep, lift) in zip(self.rig.flippers, states.flippers, strict=True)
-            if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad)
+            for flipper, (sweep, adduction) in zip(self.rig.flippers, states.flippers, strict=True)
+            if is_in_mud(self.geometry, sweep.angle_rad, adduction.angle_rad)
         )
 
     def step(
