@@ -87,13 +87,20 @@ def _unpack(path: Path) -> bytes:
 
 
 def _split_lines(path: Path, contents: bytes) -> list[str]:
-    """Return the lines without their ends, which are those of any system."""
+    """Return the lines without their ends, which are those of any system, and without quotation marks."""
     try:
         text = contents.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = contents.count(b"\n", 0, error.start) + 1
         raise LogError(f"{path}: line {line} is not text") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return _with_commas(text.replace("\r\n", "\n").replace("\r", "\n").replace('"', "").split("\n"))
+
+
+def _with_commas(lines: list[str]) -> list[str]:
+    """Separate cells by commas where a spreadsheet used semicolons or tabs, with the comma as decimal sign or not."""
+    names = next((line for line in lines[: LONGEST_HEAD + 1] if STATE in line), ",")
+    separator = next((each for each in ";\t" if each in names and "," not in names), "")
+    return [line.replace(",", ".").replace(separator, ",") for line in lines] if separator else lines
 
 
 def _find_names(path: Path, lines: list[str]) -> int:

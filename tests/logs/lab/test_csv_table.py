@@ -122,6 +122,10 @@ FORMS: dict[str, Callable[[str], bytes]] = {
     "no last line end": lambda text: text.rstrip("\n").encode(),
     "empty lines at the end": lambda text: (text + "\n\n").encode(),
     "gzip": lambda text: gzip.compress(text.encode()),
+    "quoted cells": lambda text: text.replace(",", '","').replace("\n", '"\n"').encode(),
+    "semicolons": lambda text: text.replace(",", ";").encode(),
+    "semicolons and decimal commas": lambda text: text.replace(",", ";").replace(".", ",").encode(),
+    "tabs": lambda text: text.replace(",", "\t").encode(),
 }
 
 
