@@ -200,17 +200,18 @@ def lab_estimator(
 ) -> MudEstimator:
     """Return an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
 
-    A single flipper was mounted on a fixed bench; two flippers carried a body without a rail, whose mass is unknown.
+    A single flipper was mounted on a fixed bench, unless its body moved; others carried a body without a rail, whose
+    mass is unknown.
     """
     geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE,) * len(FLIPPERS), EstimationParameters()
-    if len(lab.flippers) > 1:
+    if not lab.fixed_base:
         parameters = replace(parameters, surface_error_m=UNEVEN_M, free_body=True)
     if configuration:
         geometry, parameters = configuration.geometry, configuration.estimation
         own = dict(zip(configuration.rig.flippers, configuration.flipper_drives, strict=True))
         drives = tuple(own.get(flipper, configuration.flipper_drives[0]) for flipper in FLIPPERS)
     limited = [drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives]
-    fixed_base = parameters.fixed_base or len(lab.flippers) == 1
+    fixed_base = parameters.fixed_base or lab.fixed_base
     parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
     if surface_error_m is not None:
         parameters = replace(parameters, surface_error_m=surface_error_m)

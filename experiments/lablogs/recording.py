@@ -82,7 +82,7 @@ def recording_of_lab(lab: LabLog, surface_error_m: float | None = None) -> Recor
 
     return Recording(
         flippers=lab.flippers,
-        fixed_base=len(lab.flippers) == 1,
+        fixed_base=lab.fixed_base,
         stamp_s=lab.stamp_s,
         phase=lab.phase,
         angle_rad=lab.angle_rad,

@@ -36,6 +36,7 @@ Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
 CLIPPED_S = 0.5  # at the largest current make it a limit
+STILL_M = 0.005  # by which a captured bench moves at most
 MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
 
 
@@ -55,6 +56,11 @@ class LabLog(NamedTuple):
     body_pitch_rad: Floats  # of the nose upward, since the first known pose; NaN where unknown
     missing_settings: tuple[str, ...] = ()  # that the head names without a value
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def fixed_base(self) -> bool:
+        """Whether a single flipper moved and no body with it: it was mounted on a bench."""
+        return len(self.flippers) == 1 and not known_range(self.body_x_m) > STILL_M
 
 
 def log_name(path: Path) -> str:

@@ -88,6 +88,18 @@ def test_a_log_with_one_coordinate_has_the_advance_alone(tmp_path: Path) -> None
     assert np.isnan(log.body_height_m).all() and np.isnan(log.body_pitch_rad).all()
 
 
+@pytest.mark.parametrize("moved", [0.0, 1.0])
+def test_one_flipper_is_on_a_fixed_base_unless_its_body_moves(moved: float, tmp_path: Path) -> None:
+    columns = lab_columns()
+    add_pose(columns, 0.0, 0.0, 0.0)
+    columns["OptitrackPosition_x"] = 0.3 + moved * (columns["OptitrackPosition_x"] - 0.3)
+    assert not read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns)).fixed_base
+    for joint in ("leftsweeping", "leftadduction"):
+        columns[f"{joint}_pos"] = columns[f"{joint}_curr"] = 0.0 * columns["time"]
+    log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
+    assert log.flippers == ("right",) and log.fixed_base == (not moved)
+
+
 def test_a_log_without_a_capture_has_no_pose(tmp_path: Path) -> None:
     log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", lab_columns()))
     assert all(np.isnan(values).all() for values in (log.body_x_m, log.body_height_m, log.body_pitch_rad))
