@@ -75,8 +75,10 @@ def replay_files(
     """
     path = paths[0]
     if len(paths) == 1 and is_lab_csv(path):
-        known = configuration.pose if configuration else PoseParameters()
-        return replay_lab(read_lab_csv(path, vertical or known.vertical), configuration, method)
+        pose, geometry = PoseParameters(), FlipperGeometry()
+        if configuration:
+            pose, geometry = configuration.pose, configuration.geometry
+        return replay_lab(read_lab_csv(path, vertical or pose.vertical, geometry), configuration, method)
     if vertical:
         raise LogError(f"{path}: only a CSV of motion capture has a vertical axis to choose")
     if len(paths) == 1 and path.suffix != ".mcap":

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from control.geometry import FlipperGeometry
 from control.records import FLIPPERS, UNKNOWN, Phase
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.files.log_error import LogError
@@ -35,6 +36,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
+AUTHORS_GEOMETRY = FlipperGeometry()
 CLIPPED_S = 0.5  # at the largest current make it a limit
 STILL_M = 0.005  # by which a captured bench moves at most
 MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
@@ -73,8 +75,13 @@ def is_lab_csv(path: Path) -> bool:
     return path.name.endswith((".csv", ".csv.gz"))
 
 
-def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
-    """Read a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
+def read_lab_csv(
+    path: Path, vertical: CaptureAxis = VERTICAL_AXIS, geometry: FlipperGeometry = AUTHORS_GEOMETRY
+) -> LabLog:
+    """Read a CSV file, plain or gzip, and check its zero by the geometry of its robot. Raises LogError.
+
+    `vertical` is the axis of the capture that points up.
+    """
     table = _hold(drop_backward_rows(path, read_table(path, READ_COLUMNS)))
     _refuse_missing(path, table)
     rows = LogRows(path, table.column[TIME], table.line, _read_phases(path, table), table.findings)
@@ -89,7 +96,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     check_swapped_joints(rows, angle_rad)
     drop_stuck_signals(rows, angle_rad, current_a)
     orient(rows, angle_rad, current_a)
-    check_zero(rows, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    check_zero(rows, geometry, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
     track = read_body_track(rows, table, vertical)
     return LabLog(
         stamp_s=rows.time_s,

@@ -1,7 +1,8 @@
 """Checks the zero of the adduction: in swing the flipper's edge is above the mud, in stance it is in it.
 
 The commanded depth is that of the authors' controller, whose geometry is not published in full. Between it and this
-project's geometry lie up to 24 mm at 70 mm, because the motor is not stiff and mud resists, and 9 mm the other way.
+project's geometry of their robot lie up to 24 mm at 70 mm, because the motor is not stiff and mud resists, and 9 mm the
+other way.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,6 @@ from logs.lab.log_rows import LogRows, known_range
 
 Floats = NDArray[np.float64]
 
-GEOMETRY = FlipperGeometry()  # of the authors' robot
 DEPTH_TOLERANCE_M = 0.015  # the edge's height with the arm level: a zero that differs by this much is at the surface
 HIGHEST_SWING_M = 0.030  # above the surface, twice the height with the arm level
 LEAST_DEPTH_FRACTION = 1.0 / 3.0  # of the commanded depth; stiff mud and a weak motor reach two thirds
@@ -35,14 +35,17 @@ class Excursion(NamedTuple):
     commanded_m: float  # the largest; NaN where unknown
 
 
-def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction_m: float) -> None:
+def check_zero(
+    rows: LogRows, geometry: FlipperGeometry, angle_rad: Floats, commanded_m: Floats, extraction_m: float
+) -> None:
     """Refuse an adduction whose zero is wrong, invalidate one that may be, and report an unexpected depth.
 
     `extraction_m` is the set height of the extraction, NaN where unknown. Raises LogError.
     """
-    limit_m = GEOMETRY.clearance_m + DEPTH_TOLERANCE_M + (extraction_m if extraction_m >= 0.0 else EXTRACTION_HEIGHT_M)
+    limit_m = geometry.clearance_m + DEPTH_TOLERANCE_M + (extraction_m if extraction_m >= 0.0 else EXTRACTION_HEIGHT_M)
     for number in range(len(FLIPPERS)):
-        excursion = _measure(rows, angle_rad[:, 2 * number], angle_rad[:, 2 * number + 1], commanded_m)
+        depth_m = edge_depth_m(geometry, angle_rad[:, 2 * number], angle_rad[:, 2 * number + 1])
+        excursion = _measure(rows, depth_m, commanded_m)
         if excursion is None:
             continue
         column = POSITION_COLUMNS[2 * number + 1]
@@ -57,9 +60,8 @@ def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction
             angle_rad[:, 2 * number + 1] = np.nan
 
 
-def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_m: Floats) -> Excursion | None:
+def _measure(rows: LogRows, depth_m: Floats, commanded_m: Floats) -> Excursion | None:
     """Return the excursion of a flipper that swung and pushed; None for one that did not."""
-    depth_m = edge_depth_m(sweep_rad, adduction_rad)
     pushing = np.isin(rows.phase, (Phase.INSERTION, Phase.STANCE)) & np.isfinite(depth_m)
     known_s = np.where(np.isfinite(depth_m), rows.time_s, np.nan)
     swings = [each for each in rows.strokes(Phase.SWING) if known_range(known_s[each]) > SHORTEST_S]
@@ -73,11 +75,11 @@ def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_
     return Excursion(medians_m[highest], float(depth_m[deepest]), swings[highest].start, deepest, commanded)
 
 
-def edge_depth_m(sweep_rad: Floats, adduction_rad: Floats) -> Floats:
+def edge_depth_m(geometry: FlipperGeometry, sweep_rad: Floats, adduction_rad: Floats) -> Floats:
     """Return the depth of the lower edge below the nominal surface, as FlipperGeometry.depth_m does for one sample."""
-    tilted_drop_m = GEOMETRY.drop_m * np.cos(adduction_rad)
-    lowered_m: Floats = GEOMETRY.flipper_length_m * np.cos(sweep_rad) * np.sin(adduction_rad)
-    return tilted_drop_m - lowered_m - GEOMETRY.axis_height_m
+    tilted_drop_m = geometry.drop_m * np.cos(adduction_rad)
+    lowered_m: Floats = geometry.flipper_length_m * np.cos(sweep_rad) * np.sin(adduction_rad)
+    return tilted_drop_m - lowered_m - geometry.axis_height_m
 
 
 def _refuse_zero(rows: LogRows, column: str, excursion: Excursion) -> None:

@@ -1,11 +1,13 @@
 """Invalid logs are refused, invalid parts are left out, and both are reported with position and reason."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from firmware_host.configuration.configuration import Configuration
 from logs.files.log_error import LogError
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import read_lab_csv
@@ -61,6 +63,17 @@ def test_a_log_in_which_every_number_is_wrong_is_refused(
     change(columns)
     with pytest.raises(LogError, match=rf"run\.csv: line \d+, column {column}, at \d+\.\d+ s: .*{reason}"):
         replay_files([write_lab_log(tmp_path / "run.csv", columns)])
+
+
+def test_the_zero_is_that_of_the_configured_geometry(configuration: Configuration, tmp_path: Path) -> None:
+    columns = lab_columns()
+    for joint in ("left", "right"):
+        columns[f"{joint}adduction_pos"] -= 0.05
+    path = write_lab_log(tmp_path / "run.csv", columns)
+    with pytest.raises(LogError, match="below the surface in every swing"):
+        replay_files([path])
+    higher = replace(configuration, geometry=replace(configuration.geometry, axis_height_m=0.1))
+    assert len(replay_files([path], higher).strides) == 6
 
 
 def test_a_single_wild_sample_is_left_out(tmp_path: Path) -> None:
