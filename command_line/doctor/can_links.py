@@ -6,14 +6,16 @@ number in newer ones, and a virtual interface (vcan) has neither state nor bit r
 """
 
 import json
+import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line.doctor.findings import Finding, Level, fail, ok, ok_if
+from command_line.doctor.host_facts import UNIT
 from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
 from drivers.can.can_fd import FD_MTU, carries_fd
 from drivers.drive import DriveParameters
@@ -96,6 +98,15 @@ def examine_buses(configuration: Configuration, links: dict[str, CanLink]) -> It
     for name, bus in configuration.bus.items():
         drives = [drive for drive in configuration.drive.values() if drive.bus == name]
         yield from examine_bus(name, bus, drives, links)
+
+
+def examine_unit(unit: str, present: Collection[str], configured: Collection[str]) -> Iterator[Finding]:
+    """Find the interfaces without which the service, by the text of its unit, does not start, and that no bus needs."""
+    bound = " ".join(re.findall(r"^BindsTo=(.*)$", unit, re.MULTILINE))
+    for name in re.findall(r"sys-subsystem-net-devices-(\S+)\.device", bound.replace(r"\x2d", "-")):
+        if name not in (*present, *configured):
+            fix = f"take it out of BindsTo=, After= and WantedBy= in /{UNIT}, then 'systemctl reenable mudskipper'"
+            yield fail("unit", f"the service does not start without {name}, which no bus uses", fix)
 
 
 def examine_bus(

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from command_line import exit_codes
-from command_line.doctor.can_links import CanLink, examine_buses, read_links
+from command_line.doctor.can_links import CanLink, examine_buses, examine_unit, read_links
 from command_line.doctor.findings import Finding, Level, fail, ok, ok_if, warn
 from command_line.doctor.host_checks import (
     OURS,
@@ -35,6 +35,7 @@ from command_line.doctor.host_facts import (
     clock_is_synchronised,
     has_clock_chip,
     process_limits,
+    read_text,
     thread_priority,
     unit_limits,
 )
@@ -122,6 +123,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     if service:
         yield from examine_shell(configuration.loop, shell)
     yield from examine_buses(configuration, links)
+    yield from examine_unit(read_text(ROOT / UNIT), links, [bus.channel for bus in configuration.bus.values()])
     yield from examine_storage(ROOT, configuration.log, _log_writer(), pid is not None)
     yield _examine_clock()
     yield from daemon

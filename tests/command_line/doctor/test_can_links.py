@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from command_line.doctor import can_links
-from command_line.doctor.can_links import CanLink, examine_bus, parse_links, read_sys_links
+from command_line.doctor.can_links import CanLink, examine_bus, examine_unit, parse_links, read_sys_links
 from command_line.doctor.findings import Level
 from drivers.drive import DriveParameters
 from firmware_host.configuration.configuration import BusParameters
+from tests.folders import ROOT
 
 # iproute2 6.1 of Debian 12, with an mcp251xfd that is set up by systemd/80-can.network and .link.
 DEBIAN_12 = """[{"ifindex":3,"ifname":"can0","flags":["NOARP","UP","LOWER_UP","ECHO"],"mtu":16,"qdisc":"pfifo_fast",
@@ -126,3 +127,21 @@ def test_without_iproute2_the_kernel_s_files_tell(tmp_path: Path, monkeypatch: p
     assert links == read_sys_links(tmp_path)
     assert {name: link.up for name, link in links.items()} == {"can0": True, "can1": False}
     assert levels(links) == {"bus.left": Level.OK, "queue.left": Level.WARN, "load.left": Level.OK}
+
+
+@pytest.mark.parametrize(
+    ("present", "configured", "found"),
+    [
+        (("can0", "can1"), ("can0",), 0),  # an interface that no drive uses
+        (("can0",), ("can0",), 1),
+        ((), ("can0", "can1"), 0),  # their buses are reported
+        ((), ("/dev/ttyUSB0",), 2),
+    ],
+)
+def test_the_service_waits_for_no_interface_that_the_robot_lacks(
+    present: tuple[str, ...], configured: tuple[str, ...], found: int
+) -> None:
+    unit = (ROOT / "systemd/mudskipper.service").read_text(encoding="utf-8")
+    findings = list(examine_unit(unit, present, configured))
+    assert [finding.level for finding in findings] == [Level.FAIL] * found
+    assert not list(examine_unit("", present, configured))
