@@ -142,7 +142,7 @@ class FaultMonitor:
             return found
         health = self._drives.health
         self._check_joints(found, tick, monitor_input, health)
-        if not self.power_cut:
+        if not self.power_cut and (found or self._asks_drives):
             self._check_power(found, health)
         sent_nm = monitor_input.sent.torques_nm
         punctual = tick.late_s < PUNCTUAL_FRACTION * self._period_s

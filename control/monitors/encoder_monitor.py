@@ -59,17 +59,13 @@ class EncoderMonitor:
         """Begin the wait for a reaction to torque again."""
         self._unchanged_s = self._ignored_s = 0.0
         self._lowest_nm, self._highest_nm = inf, -inf
+        self.probed = False  # the joint is to get a step of STEP_NM, since it has ignored a torque that changed
 
     def release(self) -> None:
         """Begin again without torque, where a joint rests exactly where it is, or a hand moves it."""
         self.forget_torque()
         self._speed.reset()
         self._begin_interval()
-
-    @property
-    def probed(self) -> bool:
-        """Return whether the joint is to get a step of STEP_NM, since it has ignored a torque that changed."""
-        return self._unchanged_s > UNCHANGED_S - YIELDS_S and self._highest_nm - self._lowest_nm > YIELDING_NM
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
@@ -141,4 +137,5 @@ class EncoderMonitor:
             self._lowest_nm = torque_nm
         if torque_nm > self._highest_nm:
             self._highest_nm = torque_nm
+        self.probed = self._unchanged_s > UNCHANGED_S - YIELDS_S and self._highest_nm - self._lowest_nm > YIELDING_NM
         return self._unchanged_s > UNCHANGED_S and self._ignored_s > YIELDS_S

@@ -98,6 +98,7 @@ class JointMonitor:
         self._encoder.reset()
         self.motion.reset()
         self._stillness.reset()
+        self.probed = False  # its torque is that of `probe`
 
     def update(
         self, facts: TickFacts, state: DriveState, torque_nm: float, target: JointTarget | None = None
@@ -121,10 +122,6 @@ class JointMonitor:
         self._watch_load(found, facts, facts.dt_s, state, torque_nm)
         self._watch_heat(found, facts, state, torque_nm)
         return found
-
-    @property
-    def probed(self) -> bool:
-        return self.motion.probed or self._encoder.probed
 
     def probe(self, torque_nm: float, largest_nm: float) -> float:
         """Return the wanted torque, or that of a probe: without motion or its load, the joint has a fault."""
@@ -241,6 +238,7 @@ class JointMonitor:
             self.motion.reset()
         else:
             self.motion.update(found, state, seen_s, torque_nm, target, facts.damping)
+        self.probed = self._encoder.probed or self.motion.probed
 
     def _out_of_range(self, angle_rad: float, low_rad: float, high_rad: float) -> Fault:
         low_deg, high_deg = degrees(low_rad), degrees(high_rad)

@@ -267,8 +267,8 @@ def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
 def test_only_a_joint_that_is_probed_gets_less_than_the_wanted_torque(bench: Bench) -> None:
     wanted = Joints(0.3, -2.0, 0.3, 0.05)
     assert bench.monitor.with_probes(wanted, 0.75) is wanted
-    for joint in (1, 2, 3):
-        bench.monitor.joints[joint].motion.driven_back = PROBED
+    for joint in bench.monitor.joints[1:]:
+        joint.motion.driven_back, joint.probed = PROBED, True
     assert bench.monitor.with_probes(wanted, 0.75) == (0.3, -0.625, 0.175, 0.0)
 
 
