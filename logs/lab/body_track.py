@@ -25,6 +25,7 @@ Truths = NDArray[np.bool_]
 AXES = "xyz"
 VERTICAL_AXIS = PoseParameters().vertical  # of the authors' capture
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose is invalid where it is constant for so long and then changes by so much
+FARTHEST_M = 10.0  # from the origin of a capture
 MUCH_HEIGHT_M = 0.005  # as much as the depth of a stride; three times the uncertainty of the surface
 LEAST_AGREEMENT = 0.7  # of the stances' sum to their path: on average within 45° of the advance
 MUCH_PITCH_RAD = 0.06  # lifts or lowers the flipper by 5 mm at 85 mm of sweep to the front
@@ -39,7 +40,10 @@ class BodyTrack(NamedTuple):
 
 
 def read_body_track(rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERTICAL_AXIS) -> BodyTrack:
-    """Return the track, and report what must be known of it. A file with x alone has the advance alone."""
+    """Return the track, and report what must be known of it. A file with x alone has the advance alone.
+
+    Raises LogError for positions in another unit.
+    """
     unknown, nothing = np.full(len(rows.time_s), UNKNOWN), np.zeros(len(rows.time_s))
     columns = [name for name in BODY_COLUMNS if name in table.column]
     if not columns:
@@ -47,6 +51,8 @@ def read_body_track(rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERT
     lost = _is_lost(np.column_stack([table.column[name] for name in columns]), rows.time_s)
     position_m = np.column_stack([table.column.get(name, nothing) for name in BODY_COLUMNS])
     position_m[lost] = UNKNOWN
+    if len(columns) == len(BODY_COLUMNS):
+        _refuse_units(rows, position_m)
     up = AXES.index(vertical)
     forward = _find_forward(rows, position_m, up)
     advance_m = unknown if forward is None else position_m @ forward
@@ -58,6 +64,15 @@ def read_body_track(rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERT
     _report_direction(rows, position_m, up, columns[0])
     _report_tilt(rows, tilt_rad, pitch_rad)
     return BodyTrack(advance_m, height_m, pitch_rad)
+
+
+def _refuse_units(rows: LogRows, position_m: Floats) -> None:
+    """Refuse positions that are mostly beyond a capture's volume. Raises LogError."""
+    known = np.flatnonzero(np.isfinite(position_m[:, 0]))
+    distance_m = np.linalg.norm(position_m[known], axis=1)
+    if len(known) and float(np.median(distance_m)) > FARTHEST_M:
+        text = f"the body is {distance_m[0]:.0f} m from the origin: positions are in m"
+        raise rows.refusal(FindingKind.POSE, BODY_COLUMNS[0], int(known[0]), text)
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:

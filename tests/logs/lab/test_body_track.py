@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from control.records import Phase
+from logs.files.log_error import LogError
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import LabLog, read_lab_csv
 from tests.lab_logs import Columns, lab_columns, write_lab_log
@@ -98,6 +99,15 @@ def test_one_flipper_is_on_a_fixed_base_unless_its_body_moves(moved: float, tmp_
         columns[f"{joint}_pos"] = columns[f"{joint}_curr"] = 0.0 * columns["time"]
     log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
     assert log.flippers == ("right",) and log.fixed_base == (not moved)
+
+
+def test_positions_in_mm_are_refused(tmp_path: Path) -> None:
+    columns = lab_columns()
+    add_pose(columns, 0.0, 0.0, 0.0)
+    for axis in "xyz":
+        columns[f"OptitrackPosition_{axis}"] *= 1e3
+    with pytest.raises(LogError, match=r"line \d+, column OptitrackPosition_x, at .*: the body is 324 m from"):
+        read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
 
 
 def test_a_log_without_a_capture_has_no_pose(tmp_path: Path) -> None:
