@@ -15,7 +15,10 @@ from typing import NamedTuple
 from experiments.reports.mud_names import mud_key
 from experiments.study.option import OptionError
 from firmware_host.log.log_folder import SEGMENT
+from logs.files.log_error import LogError
 from logs.files.whole_files import is_hidden
+from logs.lab.csv_table import unpack
+from logs.lab.lab_csv import is_lab_csv, log_name
 
 ENDINGS = (".csv", ".csv.gz", ".mcap")
 LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
@@ -41,7 +44,7 @@ def parse_rule(text: str) -> GroupRule:
 def find_logs(folders: Sequence[Path]) -> list[Paths]:
     """Return the logs in folders and the folders below them; segments of one run are one log. Also accepts files.
 
-    A copy under the same name, such as the one in a report's folder, is left out: it would count as a repetition.
+    A copy under the same name, such as one in a report's folder or an unpacked one, is left out: it repeats nothing.
     """
     found: dict[Path, Path] = {}
     for folder in folders:
@@ -50,12 +53,24 @@ def find_logs(folders: Sequence[Path]) -> list[Paths]:
         found |= {path.resolve(): path for path in files if path.is_file() and path.name.endswith(ENDINGS)}
     paths: list[Path] = []
     for path in sorted(found.values(), key=lambda each: len(each.parts)):  # of two copies the one higher up stays
-        if not any(path.name == other.name and cmp(path, other, shallow=False) for other in paths):
+        if not any(_is_copy(path, other) for other in paths):
             paths.append(path)
     runs: dict[Path, list[Path]] = {}
     for path in paths:
         runs.setdefault(_first_segment(path, paths), []).append(path)
     return [tuple(sorted(run)) for run in runs.values()]
+
+
+def _is_copy(path: Path, other: Path) -> bool:
+    """Return whether files of one name have the same contents; of a CSV one may be compressed."""
+    if path.name == other.name:
+        return cmp(path, other, shallow=False)
+    if log_name(path) != log_name(other) or not (is_lab_csv(path) and is_lab_csv(other)):
+        return False
+    try:
+        return unpack(path) == unpack(other)
+    except LogError:
+        return False  # the reader says what is wrong with it
 
 
 def _first_segment(path: Path, paths: Sequence[Path]) -> Path:

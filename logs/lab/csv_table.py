@@ -48,7 +48,7 @@ class CsvTable(NamedTuple):
 
 def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
     """Read the time, the state and those of the wanted columns that the file has. Raises LogError."""
-    lines = _split_lines(path, _unpack(path))
+    lines = _split_lines(path, unpack(path))
     head = _find_names(path, lines)
     names = [name.strip() for name in lines[head].split(",")]
     numbered = [(number, line) for number, line in enumerate(lines[head + 1 :], head + 2) if line.strip()]
@@ -67,7 +67,7 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
     return _drop_rows(path, CsvTable(column, line_of_row, gait, missing, findings))
 
 
-def _unpack(path: Path) -> bytes:
+def unpack(path: Path) -> bytes:
     """Return the contents, decompressed if they are compressed; the name does not matter."""
     pieces: list[bytes] = []
     try:

@@ -1,5 +1,6 @@
 """Logs are found in folders, and their names say which mud they were measured in."""
 
+import gzip
 from itertools import chain
 from pathlib import Path
 
@@ -68,6 +69,15 @@ def test_a_copy_in_the_folder_of_a_report_is_no_repetition_and_another_log_of_th
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "one.csv").write_text(text, encoding="utf-8")
     assert find_logs([tmp_path]) == [(tmp_path / "one.csv",), (tmp_path / "other" / "one.csv",)]
+
+
+def test_a_csv_next_to_its_compressed_file_is_no_repetition(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text("1", encoding="utf-8")
+    for name, text in (("one", b"1"), ("two", b"1")):
+        (tmp_path / f"{name}.csv.gz").write_bytes(gzip.compress(text))
+    (tmp_path / "two.csv").write_text("2", encoding="utf-8")
+    found = [path.name for (path,) in find_logs([tmp_path])]
+    assert found == ["one.csv", "two.csv", "two.csv.gz"]
 
 
 def test_a_log_that_is_still_being_copied_is_no_repetition(tmp_path: Path) -> None:
