@@ -25,7 +25,7 @@ from logs.lab.columns import (
     READ_COLUMNS,
 )
 from logs.lab.csv_table import HELD_S, STATE, TIME, CsvTable, read_table
-from logs.lab.findings import Finding, FindingKind
+from logs.lab.findings import Finding, FindingKind, of_whole_log
 from logs.lab.joint_signs import orient
 from logs.lab.log_rows import LogRows, known_range
 from logs.lab.row_order import drop_backward_rows
@@ -36,6 +36,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
+FLIPPER_COLUMNS = {
+    flipper: (*POSITION_COLUMNS[2 * number : 2 * number + 2], *CURRENT_COLUMNS[2 * number : 2 * number + 2])
+    for number, flipper in enumerate(FLIPPERS)
+}
 AUTHORS_GEOMETRY = FlipperGeometry()
 CLIPPED_S = 0.5  # at the largest current make it a limit
 STILL_M = 0.005  # by which a captured bench moves at most
@@ -88,6 +92,7 @@ def read_lab_csv(
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
     joint_moved = known_range(angle_rad) > CLEAR_TRAVEL_RAD
     moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
+    _report_missing(table, moved)
     absent = np.repeat([not moved[name] for name in FLIPPERS], 2)
     angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors
     commanded_m = table.column.get(DEPTH_COLUMN, np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)))
@@ -127,10 +132,17 @@ def _hold(table: CsvTable) -> CsvTable:
 
 def _refuse_missing(path: Path, table: CsvTable) -> None:
     """Refuse a file without the positions and currents of at least one flipper. Raises LogError."""
-    needed = [(*POSITION_COLUMNS[i : i + 2], *CURRENT_COLUMNS[i : i + 2]) for i in range(0, len(POSITION_COLUMNS), 2)]
-    if not any(set(names) <= table.column.keys() for names in needed):
-        missing = ", ".join(name for names in needed for name in names if name not in table.column)
+    if not any(set(names) <= table.column.keys() for names in FLIPPER_COLUMNS.values()):
+        missing = ", ".join(name for names in FLIPPER_COLUMNS.values() for name in names if name not in table.column)
         raise LogError(f"{path}: there is no column {missing}; positions and currents of one flipper are needed")
+
+
+def _report_missing(table: CsvTable, moved: dict[str, bool]) -> None:
+    for flipper, names in FLIPPER_COLUMNS.items():
+        missing = ", ".join(name for name in names if name not in table.column)
+        if missing and moved[flipper]:
+            text = f"there is no column {missing}, so the {flipper} flipper has no coefficients"
+            table.findings.append(of_whole_log(FindingKind.EMPTY_CELL, text))
 
 
 def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:

@@ -141,6 +141,15 @@ def test_a_flipper_that_hangs_idle_is_absent_though_its_encoder_flickers(tmp_pat
     assert log.flippers == ("right",) and np.isnan(log.angle_rad[:, :2]).all()
 
 
+def test_a_flipper_without_one_of_its_columns_is_reported(tmp_path: Path) -> None:
+    columns = lab_columns()
+    del columns["rightadduction_pos"]
+    findings = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns)).findings
+    assert [str(f) for f in findings] == [
+        "there is no column rightadduction_pos, so the right flipper has no coefficients"
+    ]
+
+
 @pytest.mark.parametrize("every", [1, 10])
 def test_the_limit_and_the_zero_are_found_at_any_rate_of_rows(every: int, tmp_path: Path) -> None:
     columns = lab_columns()
