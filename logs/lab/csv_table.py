@@ -56,6 +56,8 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
         raise LogError(f"{path}: ends at line {head + 1}, which names the columns; there are no rows")
     gait, missing, findings = parse_settings(lines[:head])
     kept = [name for name in names if name in {TIME, STATE, *wanted}]
+    if twice := [name for name in kept if kept.count(name) > 1]:
+        raise LogError(f"{path}: line {head + 1} names the column {twice[0]} twice")
     places = [names.index(name) for name in kept]
     if _is_torn(numbered[-1][1], len(names), places) and len(numbered) > 1:
         line = numbered.pop()[0]

@@ -195,6 +195,7 @@ MALFORMED = {
     "nothing": ([], "none of the first 11 lines names the columns time and turtle_state"),
     "only a head": ([HEAD], "ends at line 2, which names the columns"),
     "a missing column": ([HEAD.replace("_curr", ""), *GOOD], "there is no column leftsweeping_curr"),
+    "a column twice": ([f"{HEAD},time", *[f"{row},0" for row in GOOD]], "line 2 names the column time twice"),
     "a short row": ([HEAD, *GOOD, "1,2,3", *GOOD], "line 8 has 3 fields, the columns are 10"),
     "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, the columns are 10"),
     "a word": ([HEAD, *GOOD, ROW.format("mud", 0), *GOOD], "line 8: 'mud' is not a number"),
