@@ -160,8 +160,8 @@ def draw_surroundings(number: int) -> Surroundings:
         disturbed=random.random() < 0.3,
         free_body=random.random() < 0.2 and not stuck,
         drive_type=(drive_type := _draw_drive_type(random, number)),
-        drives=tuple(_draw_drives(random)),
-        configuration=tuple(_draw_configuration(random, stuck, drive_type)),
+        drives=(drives := tuple(_draw_drives(random))),
+        configuration=tuple(_draw_configuration(random, stuck, drive_type, "current_lag_s" in dict(drives))),
     )
 
 
@@ -183,10 +183,11 @@ def _draw_drives(random: Random) -> Iterator[tuple[str, float]]:
         yield "overspeed_fraction", 1.2
 
 
-def _draw_configuration(random: Random, stuck: bool, drive_type: str) -> Iterator[tuple[str, Any]]:
+def _draw_configuration(random: Random, stuck: bool, drive_type: str, lags: bool) -> Iterator[tuple[str, Any]]:
     """Draw changes that keep a sound robot healthy: quick paths, other gains, limits and recoveries.
 
-    A drive that answers only when asked is a tick later: 12 N·m/rad leave its joint, which mud throws, oscillating.
+    A drive that answers only when asked is a tick later: 12 N·m/rad leave its joint, which mud throws, oscillating. So
+    they do for four times where the current lags: such a drive has at most the gains of its type.
     """
     yield "motion.path_speed_rad_s", round(random.uniform(1.5, 3.0), 1)
     yield "motion.fade_in_s", random.choice((0.1, 0.3, 0.5))
@@ -196,8 +197,12 @@ def _draw_configuration(random: Random, stuck: bool, drive_type: str) -> Iterato
     if random.random() < 0.3:
         asked = DRIVE_TYPES[drive_type.partition(":")[0]].parameters.answers_only
         usual = GAINS_OF_ASKED_DRIVES if asked else JointGains()
-        yield "gains.sweep_stiffness_nm_rad", round(random.uniform(6.0, 1.25 * usual.sweep_stiffness_nm_rad), 1)
-        yield "gains.adduction_stiffness_nm_rad", round(random.uniform(8.0, 1.2 * usual.adduction_stiffness_nm_rad), 1)
+        sweep, adduction = (1.0, 1.0) if lags else (1.25, 1.2)  # of the usual stiffness, at most
+        yield "gains.sweep_stiffness_nm_rad", round(random.uniform(6.0, sweep * usual.sweep_stiffness_nm_rad), 1)
+        yield (
+            "gains.adduction_stiffness_nm_rad",
+            round(random.uniform(8.0, adduction * usual.adduction_stiffness_nm_rad), 1),
+        )
     if random.random() < 0.2 and not stuck:
         yield "limits.torque_nm", 0.6
         yield "adaptation.motor_force_n", 5.0

@@ -10,7 +10,8 @@ from control.controller import SOFT_STOP_S
 from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
 from control.monitors.encoder_monitor import YIELDING_NM
-from control.records import JOINTS, NEVER_S, Torques
+from control.monitors.joint_monitor import STALLED_S
+from control.records import JOINTS, NEVER_S, Phase, Torques
 from drivers.fault_injection.failures import MOST_DELAY_S
 from firmware_host.fault_monitor import IN_MUD
 from simulation.body.plant import END_STOPS_RAD
@@ -219,8 +220,9 @@ class TrueTorque(Promise):
 
     What a right motor would have done with the same commands is its command's work along the true path. The rest is
     bounded for each time that torque is on, and so is the time for which the true torque exceeds what any command of a
-    right motor may be: a stride, in which every joint moves through air once. In mud, whose resistance is unknown, no
-    torque constant shows: there the time alone is bounded.
+    right motor may be: a stride, in which every joint moves through air once, and until a flipper that the mud holds is
+    joint_not_following. In mud, whose resistance is unknown, no torque constant shows: there the time alone is bounded,
+    but for a recovery, which pulls on purpose.
     """
 
     STRONG = 2.0
@@ -228,7 +230,7 @@ class TrueTorque(Promise):
 
     def begin(self) -> None:
         self._limit_nm = self.STRONG * self.loop.configuration.limits.torque_nm
-        self._longest_s = energy_bounds(self.loop.configuration).stride_s
+        self._longest_s = energy_bounds(self.loop.configuration).stride_s + STALLED_S
         self._reset()
 
     def _reset(self) -> None:
@@ -239,14 +241,15 @@ class TrueTorque(Promise):
         if max(self.reach.gains) < self.STRONG:
             return
         velocities_rad_s = self.mechanics.plant.velocities_rad_s
-        in_mud = self.loop.controller.target.phase in IN_MUD
+        phase = self.loop.controller.target.phase
         for index, (torque_nm, gain) in enumerate(zip(torques_nm, self.reach.gains, strict=True)):
             if gain < self.STRONG or self.reach.is_foreign(index):
                 continue
-            if not in_mud:
+            if phase not in IN_MUD:
                 self._excess_j[index] += (1.0 - 1.0 / gain) * torque_nm * velocities_rad_s[index] * dt_s
             self._lowest_j[index] = min(self._lowest_j[index], self._excess_j[index])
-            self._beyond_s[index] += dt_s if abs(torque_nm) > self._limit_nm else 0.0
+            if abs(torque_nm) > self._limit_nm and phase is not Phase.RECOVERY:
+                self._beyond_s[index] += dt_s
 
     def update(self) -> Iterator[str]:
         if self.loop.mode not in ENERGISED:
@@ -316,12 +319,17 @@ class EnergyRise:
     def reset(self) -> None:
         self._lowest_j = [joint.work_j for joint in self._work.joints]
 
+    def skip(self, index: int) -> None:
+        """Do not count what this joint received up to now."""
+        self._lowest_j[index] = self._work.joints[index].work_j
+
     def largest_j(self) -> tuple[float, str]:
         """Return the largest rise up to now by our torque, and its joint."""
         rises_j = []
         for index, joint in enumerate(self._work.joints):
-            foreign = self._reach.is_foreign(index)
-            self._lowest_j[index] = joint.work_j if foreign else min(self._lowest_j[index], joint.work_j)
+            if self._reach.is_foreign(index):
+                self.skip(index)
+            self._lowest_j[index] = min(self._lowest_j[index], joint.work_j)
             rises_j.append((joint.work_j - self._lowest_j[index], JOINTS[index]))
         return max(rises_j)
 
@@ -330,7 +338,8 @@ class LittleEnergy(Promise):
     """While the robot brakes its joints, our torque puts hardly any energy into one.
 
     The work until the end of the tick that enters DAMPING is that of the commands before, which BoundedEnergy counts:
-    after a stall that is all that the last torque did until a watchdog ended it.
+    after a stall that is all that the last torque did until a watchdog ended it. A joint whose encoder fails gets none,
+    but an ODrive brakes one beyond its velocity limit by itself; a motor that turns the wrong way then speeds it up.
     """
 
     MOST_J = 1.0  # a motor with inverted torque is detected by then
@@ -344,6 +353,9 @@ class LittleEnergy(Promise):
         if not (was_damping and self._was_damping):
             self._rise.reset()
             return
+        for index, trusted in enumerate(self.loop.fault_monitor.trusted):
+            if not trusted:
+                self._rise.skip(index)
         energy_j, joint = self._rise.largest_j()
         if energy_j > self.MOST_J:
             yield f"{joint} received {energy_j:.2f} J while damping"
