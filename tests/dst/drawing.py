@@ -186,8 +186,8 @@ def _draw_drives(random: Random) -> Iterator[tuple[str, float]]:
 def _draw_configuration(random: Random, stuck: bool, drive_type: str, lags: bool) -> Iterator[tuple[str, Any]]:
     """Draw changes that keep a sound robot healthy: quick paths, other gains, limits and recoveries.
 
-    A drive that answers only when asked is a tick later: 12 N·m/rad leave its joint, which mud throws, oscillating. So
-    they do for four times where the current lags: such a drive has at most the gains of its type.
+    A drive that answers only when asked is a tick later: 12 N·m/rad leave its joint, which mud throws, oscillating. A
+    joint whose current lags swings to and fro four times with them, so it has at most the usual gains.
     """
     yield "motion.path_speed_rad_s", round(random.uniform(1.5, 3.0), 1)
     yield "motion.fade_in_s", random.choice((0.1, 0.3, 0.5))
