@@ -63,6 +63,8 @@ class EncoderMonitor:
 
     def release(self) -> None:
         """Begin again without torque, where a joint rests exactly where it is, or a hand moves it."""
+        if abs(self._velocity_rad_s) <= RESTS_RAD_S:  # whatever speed was reported before at the same angle
+            self._reset_frozen()
         self.forget_torque()
         self._speed.reset()
         self._begin_interval()

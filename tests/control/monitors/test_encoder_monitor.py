@@ -277,6 +277,15 @@ def test_a_slip_begins_again_once_torque_was_off(
     assert not set(names + found(slipping[51 + each :], encoder)) - {""}
 
 
+def test_a_joint_that_rests_without_torque_where_its_reports_froze_is_not_stuck_any_more() -> None:
+    encoder, frozen = make_encoder(), messages([(0.3, -0.17)] * 300 + [(0.3, 0.0)] * 10)
+    names = []
+    for sample in frozen:
+        encoder.release()
+        names += found([sample], encoder)
+    assert set(names[150:300]) == {"encoder_stuck"} and set(names[-9:]) == {""}
+
+
 def test_a_torque_from_before_it_was_off_is_no_change() -> None:
     encoder, resting = make_encoder(), messages([(0.3, 0.0)] * 100)
     names = found(resting[:50], encoder)
