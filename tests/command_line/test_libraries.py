@@ -52,7 +52,11 @@ def test_status_loads_what_it_shows_and_nothing_else(folder: Path) -> None:
     own = [name for name in loaded if name.startswith("command_line.")]
     assert len(own) <= MOST_OWN and [name for name in own if name.count(".") > 1] == ["command_line.operation.status"]
     others = {name for name in loaded if name.startswith(("firmware_host.", "operator_client."))}
-    assert {name.split(".")[1] for name in others} == {"sockets", "status_client"}  # what asks the daemon
+    assert {name.split(".")[1] for name in others} == {
+        "sockets",
+        "status_client",
+        "default_paths",
+    }  # what asks the daemon
 
 
 def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> None:
