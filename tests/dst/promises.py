@@ -372,16 +372,17 @@ class BoundedEnergy(Promise):
         self._rise = EnergyRise(self.robot, self.reach)
         self._held_s = self._stopping_j = self._excess_j = 0.0
         self._before_s = self.mechanics.now_s
-        self._strongest, self._was_on = 1.0, False
+        self._strongest, self._was_on, self._was_held = 1.0, False, False
 
     def update(self) -> Iterator[str]:
         now_s = self.mechanics.now_s  # of the mechanics, which go on while the process stands still
         since_s, self._before_s = now_s - self._before_s, now_s
+        was_held, self._was_held = self._was_held, self.loop.mode in HELD
         if not self.robot.harmed:
             self._rise.reset()
             return
         self._allow_strong_motors()
-        if self.loop.mode in HELD:
+        if was_held or self._was_held:
             self._held_s += since_s
         for fault in self.loop.faults.begun:
             if fault.kind.reaction >= Reaction.SOFT_STOP:
