@@ -108,7 +108,7 @@ class LimitedMotors(Promise):
             if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
                 self.broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
             self._check_slew(index, commanded_nm, 2.0 * rounding_nm + self.reach.half_codes_nm[index], now_s)
-        if commanded_nm != self._before_nm[index]:
+        if abs(commanded_nm - self._before_nm[index]) > rounding_nm:  # cogging is no command
             self._before_nm[index], self._changed_s[index] = commanded_nm, now_s
 
     def _check_slew(self, index: int, torque_nm: float, rounding_nm: float, now_s: float) -> None:
