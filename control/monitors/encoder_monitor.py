@@ -23,6 +23,7 @@ LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not d
 HIT_RAD_S2 = 2000.0  # more than full torque accelerates a whole joint: its rotor is in the play of a belt, or hits
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
+SPEED_CODES, ANGLE_CODE_RAD = 4095, 0.0004  # of the coarsest drives: a joint may creep at half a code of its speed
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
 YIELDING_NM = 0.4  # change of the torque meanwhile: more than dry friction and shakes of the bench (±0.15 N·m)
 STEP_NM = 0.25  # more than dry friction holds in both directions
@@ -37,6 +38,7 @@ class EncoderMonitor:
         self._joint = joint
         self._jump_rad = jump_rad
         self._fastest_rad_s = fastest_rad_s
+        self._longest_frozen_s = max(FROZEN_S, SPEED_CODES * ANGLE_CODE_RAD / fastest_rad_s)
         self._speed = SpeedMonitor(joint)
         self.reset()
 
@@ -123,7 +125,7 @@ class EncoderMonitor:
         frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._moved_rad) > MOVED_RAD and self._moved_s > MOVED_S
-        if not moved and self._frozen_s <= FROZEN_S and not self._ignores_torque(state, gap_s, torque_nm):
+        if not moved and self._frozen_s <= self._longest_frozen_s and not self._ignores_torque(state, gap_s, torque_nm):
             return None
         return FaultKind.ENCODER_STUCK.fault(self._joint)
 

@@ -277,6 +277,16 @@ def test_a_slip_begins_again_once_torque_was_off(
     assert not set(names + found(slipping[51 + each :], encoder)) - {""}
 
 
+@pytest.mark.parametrize(("fastest_rad_s", "is_stuck"), [(inf, True), (9.0, False)])
+def test_a_joint_that_creeps_at_less_than_a_code_of_its_speed_is_not_stuck(
+    fastest_rad_s: float, is_stuck: bool
+) -> None:
+    """Of a DM4340P in mud, which turns at 0.0026 rad/s: its codes are 0.0049 rad/s and 0.00038 rad."""
+    creeping = messages((0.00038 * (number // 73), 0.0049) for number in range(800))
+    names = found(creeping, EncoderMonitor("left_sweep", JUMP_RAD, fastest_rad_s))
+    assert ("encoder_stuck" in names) == is_stuck
+
+
 def test_a_joint_that_rests_without_torque_where_its_reports_froze_is_not_stuck_any_more() -> None:
     encoder, frozen = make_encoder(), messages([(0.3, -0.17)] * 300 + [(0.3, 0.0)] * 10)
     names = []
