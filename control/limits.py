@@ -41,10 +41,8 @@ def limited_torque_nm(
         upward_nm *= _slow_fraction(velocity_rad_s, limits.velocity_rad_s)
     elif velocity_rad_s < -fade_rad_s:
         downward_nm *= _slow_fraction(-velocity_rad_s, limits.velocity_rad_s)
-    torque_nm = -downward_nm if wanted_nm < -downward_nm else upward_nm if wanted_nm > upward_nm else wanted_nm
     slew_nm = limits.torque_rate_nm_s * dt_s
-    lowest_nm, highest_nm = previous_nm - slew_nm, previous_nm + slew_nm
-    return lowest_nm if torque_nm < lowest_nm else highest_nm if torque_nm > highest_nm else torque_nm
+    return clip(clip(wanted_nm, -downward_nm, upward_nm), previous_nm - slew_nm, previous_nm + slew_nm)
 
 
 def clip(value: float, low: float, high: float) -> float:
