@@ -66,7 +66,7 @@ class DriveParameters:
 
     @property
     def fastest_rad_s(self) -> float:
-        """Return the speed up to which the motor can give the commanded torque, as far as its protocol tells."""
+        """Return the speed up to which the motor can give the commanded torque; unlimited where none is known."""
         return inf
 
     @property

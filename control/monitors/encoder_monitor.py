@@ -3,7 +3,8 @@
 Between two messages the angle must change by the mean of the two reported velocities times the interval, and the angle
 must follow the integral of the velocity. A slipping magnet or a broken cable violates the first condition, a frozen
 sensor the second: on a wrong angle the position loop would drive the joint to its stop at full torque. A sensor that
-freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit.
+freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit,
+unless the joint creeps through the codes of a coarse drive.
 One that freezes at exactly zero velocity shows in the torque: every joint yields a little to a torque that changes, by
 half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the arm in the stiffest mud. Where the body
 moves, the load of a joint that dry friction holds may follow a torque that changes slowly, by 0.9 N·m in 0.1 s. It does
@@ -65,9 +66,10 @@ class EncoderMonitor:
 
     def release(self) -> None:
         """Begin again without torque, where a joint rests exactly where it is, or a hand moves it."""
-        if abs(self._velocity_rad_s) <= RESTS_RAD_S:  # whatever speed was reported before at the same angle
-            self._reset_frozen()
-        self.forget_torque()
+        if abs(self._velocity_rad_s) <= RESTS_RAD_S:
+            self._reset_frozen()  # a speed that was reported at this angle is over
+        else:
+            self.forget_torque()
         self._speed.reset()
         self._begin_interval()
 
