@@ -14,7 +14,7 @@ that ends before the units finishes them at once.
 
 from collections.abc import Sequence
 from functools import partial
-from math import copysign, cos, hypot, inf, isfinite, sin
+from math import copysign, cos, hypot, inf, isfinite
 from typing import NamedTuple
 
 from control.computing.bounded_work import Work, WorkQueue, finished
@@ -58,7 +58,6 @@ DRAGGED = "the swing drags mud: its torque is too much of the stance's"
 OUTWARD_UNCERTAINTY = 0.15
 HIGHEST_SURFACE = 3.0  # standard errors above the nominal height
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
-CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 
 
 class ClosingStride(NamedTuple):
@@ -131,7 +130,7 @@ class FlipperEstimator(StrideEstimator):
     def _learn_now(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m = load[:3]
         if phase not in self._strokes and depth_m < self._free_m and phase is not Phase.RECOVERY:
-            self._tare.update(self._rise_m(load), load.adduction_nm)
+            self._tare.update(load.rise_clinging_m, load.adduction_nm)
             self._air.update(sweep_rad, load.sweep_nm)
         sweep_nm, adduction_nm = self._update_load(phase, load)
         stroke = self._strokes.get(phase)
@@ -162,7 +161,7 @@ class FlipperEstimator(StrideEstimator):
         """Return the load on sweep and adduction without the clinging mud, and without friction in a stroke."""
         friction_nm, weight_n = self._air.friction_nm, self._tare.zero.weight_n
         sweep_nm = load.sweep_nm + weight_n * load.rise_sweep_m
-        adduction_nm = load.adduction_nm + weight_n * self._rise_m(load)
+        adduction_nm = load.adduction_nm + weight_n * load.rise_clinging_m
         if phase is Phase.STANCE or (self._is_path and phase in self._strokes):
             sweep_nm -= self._direction * friction_nm
         if phase is Phase.INSERTION:
@@ -170,11 +169,6 @@ class FlipperEstimator(StrideEstimator):
         elif phase is Phase.EXTRACTION:
             adduction_nm += friction_nm
         return sweep_nm, adduction_nm
-
-    @staticmethod
-    def _rise_m(load: JointLoad) -> float:
-        """Return the rise of the clinging mud's centre per radian of adduction."""
-        return load.rise_adduction_m - CLINGING_M * sin(load.adduction_rad)
 
     def _end_phase(self, now_s: float, ended: Phase) -> None:
         if ended in self._strokes:

@@ -25,6 +25,7 @@ from control.parameters.arm_mass import GRAVITY_M_S2, ArmMass
 from control.records import UNKNOWN, DriveState
 
 SATURATION = 0.98  # of the current limit: clipped currents stay slightly below it
+CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 LONGEST_GAP_S = 0.03  # between two samples of one motion
 SHORTEST_GAP_S = 0.0005  # two frames delivered together by an adapter have no usable stamps
 CommandTimes = tuple[float, float]  # when the drives were given the last two commands that a sample may answer
@@ -50,6 +51,7 @@ class JointLoad(NamedTuple):
     depth_m: float  # of the lower edge below the nominal surface
     rise_sweep_m: float  # of the lower edge per radian of sweep: lever of an upward force
     rise_adduction_m: float
+    rise_clinging_m: float  # of the clinging mud's centre per radian of adduction
     sweep_nm: float
     adduction_nm: float
     saturated: bool  # the sweep motor is at its limit: the mud may withstand more
@@ -138,12 +140,14 @@ class JointLoads:
         """Subtract gravity as in ArmMass.gravity_torques_nm, sharing its sines with depth and levers."""
         sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
         length_m, drop_m, moment_nm = self._length_m, self._drop_m, self._moment_nm
+        rise_m = drop_m * sb + length_m * ca * cb
         return JointLoad(
             sweep_rad,
             adduction_rad,
             drop_m * cb - length_m * ca * sb - self._axis_height_m,
             -length_m * sa * sb,
-            drop_m * sb + length_m * ca * cb,
+            rise_m,
+            rise_m - CLINGING_M * sb,
             sweep_nm - moment_nm * sa * sb,
             adduction_nm + moment_nm * ca * cb,
             saturated,

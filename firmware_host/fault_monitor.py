@@ -201,13 +201,13 @@ class FaultMonitor:
 
     def _facts(self, tick: Tick, monitor_input: MonitorInput) -> TickFacts:
         mode = monitor_input.mode
-        return TickFacts(
-            now_s=tick.now_s,
-            dt_s=(1 + tick.missed) * self._period_s,
-            energised=mode in ENERGISED,
-            moving=mode in MOVING,
-            may_stand_still=monitor_input.freeing or mode not in HELD,
-            damping=mode is Mode.DAMPING,
+        return TickFacts(  # by position: it is built in every tick
+            tick.now_s,
+            (1 + tick.missed) * self._period_s,
+            mode in ENERGISED,
+            mode in MOVING,
+            monitor_input.freeing or mode not in HELD,
+            mode is Mode.DAMPING,
         )
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:

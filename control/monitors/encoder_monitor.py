@@ -95,7 +95,7 @@ class EncoderMonitor:
                 self._reset_frozen()
         if gap_s > PUNCTUAL_S:
             self._begin_interval(after_s=INTERVAL_S)  # the messages that were held up come in a burst
-        elif abs(velocity_rad_s) > self._fastest_rad_s:
+        elif not -self._fastest_rad_s <= velocity_rad_s <= self._fastest_rad_s:
             self._begin_interval(after_s=PUNCTUAL_S)  # nor does this speed count in the mean with the next one
         elif not fault and gap_s > 0.0:
             self._interval_s += gap_s

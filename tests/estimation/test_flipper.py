@@ -22,9 +22,9 @@ from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.plate_integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, Estimate, Phase, StrideEstimate
-from estimation.flipper import CLINGING_M, FlipperEstimator
+from estimation.flipper import FlipperEstimator
 from estimation.force_map import smallest_force_n
-from estimation.joint_load import FlipperDrive
+from estimation.joint_load import CLINGING_M, FlipperDrive
 from estimation.stride_estimator import GRACE_S
 from estimation.strokes.shear import Base
 from firmware_host.configuration.gait_file import PROTOCOLS
