@@ -393,9 +393,10 @@ class BoundedEnergy(Promise):
             yield f"{joint} received {energy_j:.2f} J since the first failure, the bound is {most_j:.2f} J"
 
     def _allow_strong_motors(self) -> None:
-        """Scale the bound with motors that are stronger than configured; what is found has its own bound."""
+        """Scale the bound with motors that are stronger than configured; what air shows has its own bound."""
         strongest, is_on = max(self.reach.gains), self.loop.mode in ENERGISED
-        self._strongest = max(self._strongest, min(strongest, TrueTorque.STRONG))
+        in_mud = self.loop.controller.target.phase in IN_MUD
+        self._strongest = max(self._strongest, strongest if in_mud else min(strongest, TrueTorque.STRONG))
         if strongest >= TrueTorque.STRONG and is_on and not self._was_on:
             self._excess_j += TrueTorque.MOST_J
         self._was_on = is_on and strongest >= TrueTorque.STRONG
