@@ -105,7 +105,7 @@ def examine_unit(unit: str, present: Collection[str], configured: Collection[str
     bound = " ".join(re.findall(r"^BindsTo=(.*)$", unit, re.MULTILINE))
     for name in re.findall(r"sys-subsystem-net-devices-(\S+)\.device", bound.replace(r"\x2d", "-")):
         if name not in (*present, *configured):
-            fix = f"take it out of BindsTo=, After= and WantedBy= in /{UNIT}, then 'systemctl reenable mudskipper'"
+            fix = f"'mudskipper install' again takes it out of /{UNIT}; edit BindsTo=, After= and WantedBy= of your own"
             yield fail("unit", f"the service does not start without {name}, which no bus uses", fix)
 
 

@@ -31,6 +31,7 @@ COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s
 Find = Callable[[str], str | None]  # returns the path of a program
 NEXT = """\
 Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), then
+  mudskipper install                 again, so that the service waits for your buses
   adduser YOU mudskipper             an operator; takes effect at the next login
   systemctl start mudskipper
   mudskipper doctor; mudskipper check"""

@@ -8,19 +8,24 @@ written last, so an interrupted installation is repeated. The configuration alwa
 """
 
 import json
+import re
 import shlex
 import sysconfig
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from firmware_host.sockets.user_groups import VIEWERS
 
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
 LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
+DEVICE = "sys-subsystem-net-devices-{}.device"
+DEFAULT_DEVICES = f"{DEVICE.format('can0')} {DEVICE.format('can1')}"  # likewise
+INTERFACE = re.compile(r"[\w.-]+", re.ASCII)
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
 SERVICE, LIVE_SERVICE = "mudskipper", "mudskipper-live"
 NETWORKD, WAIT_ONLINE = "systemd-networkd", "systemd-networkd-wait-online"
@@ -106,17 +111,37 @@ def source_folder() -> Path:
     return in_tree if (in_tree / "mudskipper.service").exists() else installed
 
 
-def load_sources(prefix: Path, folder: Path | None = None) -> dict[str, str]:
-    """Return the text of each file by its installed path, of this version or from another folder. Raises OSError."""
+def load_sources(prefix: Path, folder: Path | None = None, configuration: str = "") -> dict[str, str]:
+    """Return the text of each file by its installed path, of this version or from another folder. Raises OSError.
+
+    The unit waits for the CAN interfaces of this configuration, or for the default ones where it cannot be read.
+    """
     texts = {path: ((folder or source_folder()) / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
     for unit in (UNIT, LIVE_UNIT):
         texts[unit] = texts[unit].replace(DEFAULT_PREFIX, str(prefix))
+    with suppress(ValueError, LookupError, TypeError, AttributeError):  # the daemon says what is wrong with it
+        texts[UNIT] = _bound_to(_interfaces(tomllib.loads(configuration)), texts[UNIT])
     return texts
+
+
+def _interfaces(configuration: dict[str, Any]) -> list[str]:
+    """Return the network interfaces that the daemon needs at its start."""
+    if configuration.get("loop", {}).get("wait_for_bus", False):
+        return []
+    buses = configuration["bus"].values()
+    return [bus["channel"] for bus in buses if bus["interface"] == "socketcan" and INTERFACE.fullmatch(bus["channel"])]
+
+
+def _bound_to(interfaces: Sequence[str], unit: str) -> str:
+    devices = " ".join(DEVICE.format(name.replace("-", r"\x2d")) for name in interfaces)
+    lines = unit.replace(DEFAULT_DEVICES, devices).splitlines(keepends=True)
+    return "".join(line for line in lines if line.strip() not in ("BindsTo=", "WantedBy="))
 
 
 def plan_installation(system: System, folder: Path | None = None) -> Plan:
     """Plan with the files of this version, or of one in another folder."""
-    sources, before = load_sources(system.prefix, folder), _load_manifest(system.root)
+    configuration = _text_of(system.root / CONFIGURATION)
+    sources, before = load_sources(system.prefix, folder, configuration), _load_manifest(system.root)
     after = {path: _digest(text) for path, text in sources.items()}
     plan = Plan([], [])
     for path, text in sources.items():
@@ -182,6 +207,8 @@ def _commands(system: System, changed: set[str], is_new: bool) -> Iterator[Step]
         yield Command(("networkctl", "reload"))
     if is_new and not system.is_enabled(SERVICE):
         yield system.command("systemctl", "enable", SERVICE)
+    elif UNIT in changed and system.is_enabled(SERVICE):
+        yield system.command("systemctl", "reenable", SERVICE)  # its interfaces may be others
 
 
 def plan_removal(system: System, purge: bool) -> Plan:
@@ -192,7 +219,7 @@ def plan_removal(system: System, purge: bool) -> Plan:
         if system.is_enabled(service) or (system.live and system.run(query).text.strip() == "active"):
             now = ("--now",) if system.live else ()
             plan.steps.append(system.command("systemctl", "disable", *now, service))
-    for path, text in load_sources(system.prefix).items():
+    for path, text in load_sources(system.prefix, configuration=_text_of(root / CONFIGURATION)).items():
         _plan_removal_of(plan, root / path, {_digest(text), before.get(path)}, purge)
     for link in LINKS:
         if (root / link).is_symlink() and (root / link).readlink() == _target(system, link):
