@@ -15,6 +15,7 @@ orders is limited as every operator's order is. A law that raises, or answers wh
 
 import runpy
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from traceback import extract_tb
@@ -24,6 +25,7 @@ from command_line.errors import usage_error
 from command_line.json_output import Answer
 from command_line.operation.attended_walk import LEASE_S, LawError, attend, attend_pose
 from command_line.operation.operation import TakeOver
+from command_line.screen import complain
 from command_line.shared_options import Json, Socket
 from experiments.study.option import Option
 from firmware_host.lease import TAKEN_OVER
@@ -110,12 +112,16 @@ def angles_of(law: Law, status: Report) -> Report:
 
 
 def _answer_of(law: Law, seen: Any) -> Any:
+    begun_s = time.monotonic()
     try:
-        return law(seen)
+        answer = law(seen)
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's law
         calls = extract_tb(problem.__traceback__)[1:]  # after the one above
         own = [f" in line {call.lineno}" for call in calls if call.filename == calls[0].filename]
         raise LawError(f"the law raised {type(problem).__name__}{''.join(own[-1:])}: {problem}") from problem
+    if time.monotonic() - begun_s > LEASE_S:
+        complain(f"the law took {time.monotonic() - begun_s:.1f} s: after {LEASE_S:g} s it loses the lease")
+    return answer
 
 
 def _give(client: StatusClient, method: str, order: Report, mode: str) -> None:

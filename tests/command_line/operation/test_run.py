@@ -134,6 +134,14 @@ def test_a_law_that_fails_stops_the_robot_and_is_named(
     assert printed.out.splitlines()[-1] == "hold" and all(name in printed.err for name in named)
 
 
+def test_a_law_that_takes_longer_than_its_lease_is_named(
+    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "LEASE_S", 0.01)
+    run.run(law(tmp_path, "import time; time.sleep(0.02)"), socket=tmp_path)
+    assert capsys.readouterr().err.count("the law took 0.0 s: after 0.01 s") == 2  # strides
+
+
 def test_an_order_that_the_daemon_refuses_stops_the_robot(
     daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
