@@ -70,11 +70,7 @@ class Transition(NamedTuple):
 
 def _at_least(reaction: Reaction) -> Cause:
     name = reaction.name.lower().replace("_", " ")
-
-    def is_true(request: Request, health: Health) -> bool:
-        return health.worst is not None and health.worst.kind.reaction >= reaction
-
-    return Cause(f"fault: {name}", is_true)
+    return Cause(f"fault: {name}", lambda request, health: health.reaction >= reaction)
 
 
 def _requested(wanted: Request) -> Cause:

@@ -50,7 +50,6 @@ class JointLoad(NamedTuple):
     adduction_rad: float
     depth_m: float  # of the lower edge below the nominal surface
     rise_sweep_m: float  # of the lower edge per radian of sweep: lever of an upward force
-    rise_adduction_m: float
     rise_clinging_m: float  # of the clinging mud's centre per radian of adduction
     sweep_nm: float
     adduction_nm: float
@@ -140,14 +139,12 @@ class JointLoads:
         """Subtract gravity as in ArmMass.gravity_torques_nm, sharing its sines with depth and levers."""
         sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
         length_m, drop_m, moment_nm = self._length_m, self._drop_m, self._moment_nm
-        rise_m = drop_m * sb + length_m * ca * cb
         return JointLoad(
             sweep_rad,
             adduction_rad,
             drop_m * cb - length_m * ca * sb - self._axis_height_m,
             -length_m * sa * sb,
-            rise_m,
-            rise_m - CLINGING_M * sb,
+            drop_m * sb + length_m * ca * cb - CLINGING_M * sb,
             sweep_nm - moment_nm * sa * sb,
             adduction_nm + moment_nm * ca * cb,
             saturated,

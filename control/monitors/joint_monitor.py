@@ -10,7 +10,7 @@ from typing import NamedTuple
 from control.faults import Fault, FaultKind
 from control.limits import JointRange
 from control.monitors.encoder_monitor import STEP_NM, EncoderMonitor
-from control.monitors.motion_monitor import PROBE_NM, PROBED, JointDynamics, MotionMonitor
+from control.monitors.motion_monitor import PROBE_NM, JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding
 from control.parameters.fault_bounds import FaultBounds
@@ -238,7 +238,7 @@ class JointMonitor:
             self.motion.reset()
         else:
             self.motion.update(found, state, seen_s, torque_nm, target, facts.damping)
-        self.probed = self._encoder.probed or self.motion.driven_back == PROBED
+        self.probed = self._encoder.probed or self.motion.probed
 
     def _out_of_range(self, angle_rad: float, low_rad: float, high_rad: float) -> Fault:
         low_deg, high_deg = degrees(low_rad), degrees(high_rad)

@@ -99,7 +99,7 @@ class MotionMonitor:
     def reset(self) -> None:
         self.unexplained_j = self.away_rad = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
-        self._target_rad = self._error_rad = self._lag_rad = UNKNOWN
+        self._target_rad = self._error_rad = UNKNOWN
         # largest errors: since the target was passed, before on the other side, and before that on the same side
         self._excursion_rad = self._excursion_before_rad = self._same_side_rad = 0.0
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
@@ -143,8 +143,7 @@ class MotionMonitor:
         self._impulse_nm_s = self._elapsed_s = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
         self._target_rad, self._error_rad = target_rad, target_rad - angle_rad
-        self._lag_rad = abs(self._error_rad)
-        following = not self._lag_rad > self._following_rad  # also without a target
+        following = not abs(self._error_rad) > self._following_rad  # also without a target
         explained = self.unexplained_j <= self._runaway_j and self.driven_back < NOT_YIELDED
         if not following or not explained or self.away_rad > AWAY_RAD:
             self._report(found, target)
@@ -181,7 +180,7 @@ class MotionMonitor:
         """Add to the path away, of which a part is kept, and to the present excursion. Without a target it is zero."""
         error_rad = target_rad - (self._angle_rad + step_rad)
         lag_rad = abs(error_rad)
-        turned_rad = abs(step_rad) - abs(target_step_rad) + lag_rad - self._lag_rad
+        turned_rad = abs(step_rad) - abs(target_step_rad) + lag_rad - abs(self._error_rad)
         away_rad = kept * self.away_rad + turned_rad
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
         self._excursion_before_rad *= kept
@@ -238,6 +237,7 @@ class MotionMonitor:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:
             return
+        error_rad = abs(self._error_rad)
         most_rad = self._following_rad + FOLLOWING_S * abs(target.velocity_rad_s)
-        if self._lag_rad > most_rad:
-            found.append(FaultKind.FOLLOWING_ERROR.fault(self._joint, error_rad=self._lag_rad, limit_rad=most_rad))
+        if error_rad > most_rad:
+            found.append(FaultKind.FOLLOWING_ERROR.fault(self._joint, error_rad=error_rad, limit_rad=most_rad))

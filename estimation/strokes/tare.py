@@ -41,9 +41,9 @@ class Tare:
         self._n = 0
         self._weight = self._square = 0.0
 
-    def update(self, rise_adduction_m: float, adduction_nm: float) -> None:
+    def update(self, rise_clinging_m: float, adduction_nm: float) -> None:
         """Add a sample in free air, with the rise of the clinging mud's centre per radian of adduction."""
-        weight_n = -adduction_nm / rise_adduction_m
+        weight_n = -adduction_nm / rise_clinging_m
         self._n += 1
         fraction = 1.0 / min(self._n, MEMORY)
         change_n = weight_n - self._weight

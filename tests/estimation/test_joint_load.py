@@ -16,6 +16,7 @@ from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
 from control.records import DriveState
 from estimation.joint_load import (
+    CLINGING_M,
     LONGEST_GAP_S,
     NO_COMMANDS,
     SATURATION,
@@ -72,7 +73,7 @@ def test_the_pose_comes_with_its_depth_and_levers(sweep: float, lift: float) -> 
     assert (load.sweep_rad, load.adduction_rad) == (sweep, lift)
     assert load.depth_m == pytest.approx(GEOMETRY.depth_m(sweep, lift), abs=1e-15)
     assert load.rise_sweep_m == pytest.approx(jacobian.z_sweep, abs=1e-15)
-    assert load.rise_adduction_m == pytest.approx(jacobian.z_adduction, abs=1e-15)
+    assert load.rise_clinging_m + CLINGING_M * sin(lift) == pytest.approx(jacobian.z_adduction, abs=1e-15)
 
 
 def test_friction_is_what_the_motor_spends_on_itself_and_that_of_an_unknown_velocity_is_cogging_alone() -> None:
