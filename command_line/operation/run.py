@@ -119,8 +119,9 @@ def _answer_of(law: Law, seen: Any) -> Any:
         calls = extract_tb(problem.__traceback__)[1:]  # after the one above
         own = [f" in line {call.lineno}" for call in calls if call.filename == calls[0].filename]
         raise LawError(f"the law raised {type(problem).__name__}{''.join(own[-1:])}: {problem}") from problem
-    if time.monotonic() - begun_s > LEASE_S:
-        complain(f"the law took {time.monotonic() - begun_s:.1f} s: after {LEASE_S:g} s it loses the lease")
+    took_s = time.monotonic() - begun_s
+    if took_s > LEASE_S:
+        complain(f"the law took {took_s:.1f} s: after {LEASE_S:g} s it loses the lease")
     return answer
 
 
