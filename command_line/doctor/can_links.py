@@ -105,7 +105,8 @@ def examine_unit(unit: str, present: Collection[str], configured: Collection[str
     bound = " ".join(re.findall(r"^BindsTo=(.*)$", unit, re.MULTILINE))
     for name in re.findall(r"sys-subsystem-net-devices-(\S+)\.device", bound.replace(r"\x2d", "-")):
         if name not in (*present, *configured):
-            fix = f"'mudskipper install' again takes it out of /{UNIT}; edit BindsTo=, After= and WantedBy= of your own"
+            own = "in a unit of your own edit BindsTo=, After= and WantedBy=, then 'systemctl reenable mudskipper'"
+            fix = f"'mudskipper install' again writes /{UNIT} for your buses; {own}"
             yield fail("unit", f"the service does not start without {name}, which no bus uses", fix)
 
 
