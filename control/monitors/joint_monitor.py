@@ -187,9 +187,12 @@ class JointMonitor:
             found.append(self._fault(FaultKind.DRIVE_ERROR, flags=f"0x{state.error_flags:x}"))
         if facts.moving and not state.closed_loop:
             found.append(self._fault(FaultKind.DRIVE_DISARMED))
-        self._energised_s = self._energised_s + seen_s if state.closed_loop and not facts.energised else 0.0
-        if self._energised_s > ENERGISED_S:
-            found.append(self._fault(FaultKind.DRIVE_ENERGISED, activity="in closed loop"))
+        if facts.energised or not state.closed_loop:
+            self._energised_s = 0.0
+        else:
+            self._energised_s += seen_s
+            if self._energised_s > ENERGISED_S:
+                found.append(self._fault(FaultKind.DRIVE_ENERGISED, activity="in closed loop"))
         if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:
             self._watch_voltage(found, seen_s, state.bus_voltage_v)
 
@@ -210,11 +213,14 @@ class JointMonitor:
             found.append(self._out_of_range(angle_rad, self._low_rad, self._high_rad))
         elif self._stalled_s > RETURNING_S and not self._span.min_rad <= angle_rad <= self._span.max_rad:
             found.append(self._out_of_range(angle_rad, *self._span))
-        self._fast_s = self._fast_s + seen_s if velocity_rad_s > self._fast_rad_s else 0.0
-        if self._fast_s and self._fast_s > max(self._bounds.fast_s - seen_s / 2.0, 0.0):
-            limit_rad_s = self._limits.velocity_rad_s
-            kind = FaultKind.JOINT_VELOCITY
-            found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
+        if velocity_rad_s > self._fast_rad_s:
+            self._fast_s += seen_s
+            if self._fast_s > self._bounds.fast_s - seen_s / 2.0:
+                limit_rad_s = self._limits.velocity_rad_s
+                kind = FaultKind.JOINT_VELOCITY
+                found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
+        else:
+            self._fast_s = 0.0
         if not self._stillness.update(angle_rad, seen_s):
             self._stalled_s = 0.0
 
@@ -250,31 +256,43 @@ class JointMonitor:
         self, found: list[Fault], facts: TickFacts, seen_s: float, state: DriveState, torque_nm: float
     ) -> None:
         current_a = state.current_a
-        self._current_ticks = self._current_ticks + 1 if abs(current_a) > self._most_a else 0
-        if self._current_ticks >= CURRENT_TICKS:
-            found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
+        if abs(current_a) > self._most_a:
+            self._current_ticks += 1
+            if self._current_ticks >= CURRENT_TICKS:
+                found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
+        else:
+            self._current_ticks = 0
         measured_nm = current_a * self._constant_nm_a
-        differs = (
-            abs(torque_nm - measured_nm) > self._missing_nm and not abs(state.velocity_rad_s) > self._fastest_rad_s
-        )
-        self._missing_s = self._missing_s + seen_s if differs and facts.moving else 0.0
-        if self._missing_s > MISSING_S:  # a frozen current, lost commands, a silent clamp
-            kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
-            found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
-        in_range = self._span.min_rad <= state.angle_rad <= self._span.max_rad
-        least_nm = self._saturated_nm if in_range else self._returning_nm
-        pushed = abs(torque_nm) >= least_nm > 0.0 and not facts.may_stand_still
-        self._stalled_s = self._stalled_s + seen_s if pushed else 0.0
-        if self._stalled_s > STALLED_S:
-            found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
+        differs = abs(torque_nm - measured_nm) > self._missing_nm
+        if differs and facts.moving and not abs(state.velocity_rad_s) > self._fastest_rad_s:
+            self._missing_s += seen_s
+            if self._missing_s > MISSING_S:  # a frozen current, lost commands, a silent clamp
+                kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
+                found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
+        else:
+            self._missing_s = 0.0
+        pushing_nm = abs(torque_nm)
+        if (
+            pushing_nm >= self._returning_nm > 0.0
+            and not facts.may_stand_still
+            and (pushing_nm >= self._saturated_nm or not self._span.min_rad <= state.angle_rad <= self._span.max_rad)
+        ):
+            self._stalled_s += seen_s
+            if self._stalled_s > STALLED_S:
+                found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
+        else:
+            self._stalled_s = 0.0
 
     # heat
 
     def _watch_heat(self, found: list[Fault], facts: TickFacts, state: DriveState, torque_nm: float) -> None:
         measured_c = state.temperature_c
-        self._hot_s = self._hot_s + min(facts.dt_s, MOST_SEEN_S) if self._nearly_hot_c <= measured_c else 0.0
-        if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
-            measured_c = UNKNOWN
+        if measured_c >= self._nearly_hot_c:
+            self._hot_s += min(facts.dt_s, MOST_SEEN_S)
+            if self._hot_s <= TWO_MESSAGES_S:
+                measured_c = UNKNOWN
+        else:
+            self._hot_s = 0.0
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # more is no measurement
         if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old current does not heat for ever
             current_a = torque_nm / self._constant_nm_a
