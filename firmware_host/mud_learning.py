@@ -125,7 +125,7 @@ class MudLearning:
         if closing is not None:
             self.estimator.work.add(self._close(closing, controller, controller.gait.commanded_depth_m))
         conditions = controller.gait.conditions
-        if conditions is not None:
+        if conditions is not None and controller.target.phase is not Phase.REST:  # on the way into or out of the gait
             if self._lasts(self._meets(conditions)) and controller.gait.end_phase():
                 self._firm_ticks = 0
                 depth_m = controller.target.depth_m

@@ -13,6 +13,7 @@ from control.controller import WalkOrder
 from control.depth.gait_choice import GaitAdaptation
 from control.faults import Fault, FaultKind
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPhase
 from control.records import NO_LOAD, Estimate, FlipperLoad, GaitTarget, Phase, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.mud_learning import FIRM_TICKS, LARGEST_N_M3, STORED_STRIDES, MudLearning
@@ -43,7 +44,7 @@ class FakeGait:
     next_depth_m: float = 0.03
     parameters: GaitParameters = GaitParameters()
     next_parameters: GaitParameters = GaitParameters()
-    conditions: None = None
+    conditions: GaitPhase | None = None
     ended: int = 0
 
     def is_choice_due(self, within_s: float, may_turn: bool) -> bool:
@@ -170,6 +171,20 @@ def test_an_insertion_ends_at_a_lasting_load_but_not_at_an_outlier(learning: Mud
 )
 def test_only_adaptive_insertions_end_early(learning: MudLearning, adaptive: bool, phase: Phase) -> None:
     assert not any(firm_ticks(learning, WalkOrder(0.03, adaptive=adaptive), phase, [True] * 10))
+
+
+@pytest.mark.parametrize(("phase", "ended"), [(Phase.STROKE, 1), (Phase.REST, 0)])
+def test_a_condition_counts_only_while_the_flippers_follow_the_gait(
+    learning: MudLearning, phase: Phase, ended: int
+) -> None:
+    """Flippers that a walk first raises out of the mud had ended the first phase before it began."""
+    controller = FakeController(
+        WalkOrder(0.03, adaptive=False), FakeGait(conditions=GaitPhase("stance", until_force_n=1.0))
+    )
+    controller.target = controller.target._replace(phase=phase)
+    for _ in range(FIRM_TICKS):
+        step(learning, controller, loads=(NO_LOAD._replace(force_x_n=-1.5),))
+    assert controller.gait.ended == ended
 
 
 def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> None:
