@@ -7,7 +7,7 @@ Within a row the speed rises and falls as half a cosine, so joint velocities are
 from math import cos, degrees, fsum, pi, radians, sin
 from typing import NamedTuple
 
-from control.gait.stride_table import stride_table
+from control.gait.stride_table import Begun, stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath, GaitPhase
@@ -86,11 +86,11 @@ class Gait:
         self._row = 0
         self._time_s = 0.0
         self._turns: tuple[Turn, ...] = ()
-        self._gap = (0.0, 0.0)  # in sweep and depth, that a phase which ended early leaves to the next row
+        self._is_checked = True  # the path of the stride, which no phase has left by an early end
 
-    def _tabulate(self, depth_m: float) -> None:
+    def _tabulate(self, depth_m: float, begun: Begun | None = None) -> None:
         self.commanded_depth_m = depth_m  # of the stride under way
-        self._rows = stride_table(self.path or self._aim, self.geometry, depth_m)
+        self._rows = stride_table(self.path or self._aim, self.geometry, depth_m, begun)
         self._before_swing = near = next(i for i, row in enumerate(self._rows) if row.phase is Phase.SWING) - 1
         while near > 0 and self._rows[near].duration_s < BRIEF_S:
             near -= 1
@@ -153,19 +153,20 @@ class Gait:
     def end_phase(self) -> bool:
         """End the phase where it is, an insertion only in the mud; return whether it ended.
 
-        The stride continues at the depth that its insertion reached. The next row begins where this one ended.
+        The stride continues at the depth that its insertion reached. The next phase takes its path from here.
         """
         here, row = self._target(), self._rows[self._row]
         inserts = self.path.phase[row.number].name == "insertion" if self.path else row.phase is Phase.INSERTION
         may_end = here.depth_m > 0.0 if inserts else self.path is not None
         if not may_end:
             return False
-        if inserts:
-            self._tabulate(here.depth_m)
+        depth_m = here.depth_m if inserts else self.commanded_depth_m
+        names = {each.number: each.phase for each in self._rows}  # no phase changes its name within a stride
+        self._tabulate(depth_m, Begun(row.number + 1, here.sweep_rad, here.depth_m))
+        self._rows = tuple(each._replace(phase=names.get(each.number, each.phase)) for each in self._rows)
         self._row = next(i for i, each in enumerate(self._rows) if each.number > row.number)
         self._time_s = 0.0
-        begin = self._rows[self._row]
-        self._gap = (here.sweep_rad - begin.sweep_start_rad, here.depth_m - begin.depth_start_m)
+        self._is_checked = False
         return True
 
     def _turn(self) -> None:
@@ -179,7 +180,6 @@ class Gait:
     def _end_row(self) -> None:
         left_over_s = self._time_s - self._rows[self._row].duration_s
         self._row += 1
-        self._gap = (0.0, 0.0)
         if self._row == len(self._rows):
             self.stride += 1
             self._begin_stride()
@@ -194,9 +194,6 @@ class Gait:
             added = [turn.after(self._time_s, row.duration_s) for turn in self._turns]
             sweep_rad += fsum(angle_rad for angle_rad, _ in added)
             sweep_rad_s += fsum(velocity_rad_s for _, velocity_rad_s in added)
-        sweep_gap_rad, depth_gap_m = self._gap
-        if sweep_gap_rad or depth_gap_m:
-            sweep_rad, depth_m = sweep_rad + sweep_gap_rad * (1.0 - fraction), depth_m + depth_gap_m * (1.0 - fraction)
-            sweep_rad_s, depth_m_s = sweep_rad_s - sweep_gap_rad * rate, depth_m_s - depth_gap_m * rate
-            depth_m = min(depth_m, self.geometry.deepest_m(degrees(sweep_rad)))  # this path was not checked
+        if not self._is_checked:
+            depth_m = min(depth_m, self.geometry.deepest_m(degrees(sweep_rad)))
         return GaitTarget(row.phase, self.stride, sweep_rad, sweep_rad_s, depth_m, depth_m_s)

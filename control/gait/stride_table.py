@@ -23,6 +23,14 @@ CHORDS = 32  # of a half ellipse, whose length they give to 0.1 %
 CRUTCHING = ["insertion", "stance", "extraction", "swing"]
 
 
+class Begun(NamedTuple):
+    """Where a phase begins, since the one before it ended early."""
+
+    number: int
+    sweep_rad: float
+    depth_m: float
+
+
 class PhaseRow(NamedTuple):
     phase: Phase
     duration_s: float
@@ -89,17 +97,26 @@ def crutching_parameters(path: GaitPath) -> GaitParameters | None:
     return parameters if crutching(parameters).phase == path.phase else None
 
 
-def stride_table(gait: GaitParameters | GaitPath, geometry: FlipperGeometry, depth_m: float) -> tuple[PhaseRow, ...]:
+def stride_table(
+    gait: GaitParameters | GaitPath, geometry: FlipperGeometry, depth_m: float, begun: Begun | None = None
+) -> tuple[PhaseRow, ...]:
     """Return the rows of one stride at `depth_m` below the nominal surface, in time order."""
     path = crutching(gait) if isinstance(gait, GaitParameters) else gait
     ordered = [phase.name for phase in path.phase if phase.name != "pause"] == CRUTCHING
     here = position(path.phase[-1].way_points[-1], geometry, depth_m)
     rows = list[PhaseRow]()
     for number, phase in enumerate(path.phase):
+        if begun and number == begun.number:
+            here = begun.sweep_rad, begun.depth_m
         legs = list(_legs(number, phase, here, geometry, depth_m, ordered))
         here = legs[-1].sweep_end_rad, legs[-1].depth_end_m
         rows += _timed(legs, phase, geometry)
-    if any(row.phase is Phase.STROKE for row in rows):  # one that is not pure makes strokes of all
+    return _named(rows)
+
+
+def _named(rows: list[PhaseRow]) -> tuple[PhaseRow, ...]:
+    """Return the rows by their names for the estimator: one that is not pure makes strokes of all."""
+    if any(row.phase is Phase.STROKE for row in rows):
         rows = [row if row.phase in (Phase.SWING, Phase.PAUSE) else row._replace(phase=Phase.STROKE) for row in rows]
     return tuple(rows)
 

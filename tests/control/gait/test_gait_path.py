@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import islice, pairwise
-from math import radians
+from math import hypot, radians
 
 import pytest
 
@@ -102,6 +102,30 @@ def test_one_phase_that_is_not_pure_makes_strokes_of_all() -> None:
     oblique = replace(crutching.phase[0], way_points=(WayPoint(25.0, depth_fraction=1.0),))
     path = replace(crutching, phase=(oblique, *crutching.phase[1:]))
     assert [row.phase for row in stride_table(path, GEOMETRY, DEPTH_M)] == [*[Phase.STROKE] * 3, Phase.SWING]
+
+
+def test_after_an_early_end_a_pause_rests_and_the_next_phase_keeps_its_speed() -> None:
+    insertion, stance, extraction, swing = load("walking").phase
+    gait = started(GaitPath((insertion, stance, GaitPhase("pause", duration_s=0.2), extraction, swing)))
+    while (ended := gait.step(PERIOD_S)).sweep_rad > radians(15.0):
+        pass
+    assert gait.end_phase()
+    rest, rise = targets(gait, 75), targets(gait, 75)
+    assert {(each.sweep_rad, each.depth_m) for each in rest} == {(ended.sweep_rad, ended.depth_m)}
+    speeds_m_s = [hypot(0.12 * each.sweep_velocity_rad_s, each.depth_velocity_m_s) for each in rise]
+    assert 0.5 < max(speeds_m_s) < 0.7  # its mean is 0.5 m/s
+
+
+def test_a_way_point_that_an_early_end_left_is_reached_by_the_next_phase() -> None:
+    down = WayPoint(30.0, depth_m=DEPTH_M)
+    phases = [GaitPhase("insertion", (down,), speed_m_s=speed_m_s) for speed_m_s in (0.2, 0.02)]
+    gait = started(GaitPath((*phases, *load("walking").phase[1:])))
+    while gait.step(PERIOD_S).depth_m < 0.01:
+        pass
+    assert gait.end_phase()
+    slow = targets(gait, 300)
+    assert slow[-1].depth_m == pytest.approx(0.01 + 0.02 * 300 * PERIOD_S, abs=0.001)
+    assert {each.sweep_rad for each in slow} == {radians(30.0)}
 
 
 @pytest.mark.parametrize(("name", "after_s", "depth_m"), [("slow_insertion", 2.0, 0.05), ("ellipse", 0.2, 0.03)])
