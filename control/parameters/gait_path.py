@@ -40,7 +40,9 @@ class GaitPhase:
         float | None, Bounds(0.2, 50.0), Meaning("of the mud on a flipper that ends the phase early; 1 is a contact")
     ] = None
     until_depth_m: Annotated[
-        float | None, Bounds(-0.2, 0.2), Meaning("measured at a flipper, from which on the phase ends early")
+        float | None,
+        Bounds(-0.2, 0.2),
+        Meaning("measured at a flipper on its way down, from which on the phase ends early"),
     ] = None
 
 

@@ -6,7 +6,7 @@ backward or forward k_s Ψ, or what moves the body against its drag if that is l
 of 49.5 % water is expected. The acceleration of body and arms is not in it: it lasts tens of milliseconds.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil, cos, degrees, floor, hypot, sin
 from typing import NamedTuple
 
@@ -60,7 +60,8 @@ def key_problems(path: GaitPath) -> Iterator[str]:
     if "swing" not in names or names.index("swing") != len(names) - 1 or len(names) < 2:
         yield f"phase = {', '.join(names) or 'none'}: the last of two or more must be a swing, and no other one"
     for number, phase in enumerate(path.phase):
-        swings = "swing" in names[number : number + 2]
+        ahead = [name for name in names[number + 1 :] if name != "pause"]
+        swings = "swing" in [phase.name, *ahead[:1]]
         whole = "of a swing and right before one, which would begin in the mud" if swings else ""
         if path.right_offset_fraction:
             whole = "where right_offset_fraction keeps the flippers apart"
@@ -94,10 +95,20 @@ def _stride_problems(path: GaitPath, configuration: Configuration, depth_m: floa
     rows = stride_table(path, configuration.geometry, depth_m)
     if not any(row.phase is Phase.SWING for row in rows):
         yield f"{_phase_key(path, -1)}.duration_s is missing: a swing that stays where it is has no path to end it"
+    yield from _depth_problems(path, rows)
     for row in rows:
         found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration, mud))
         if problem := next(found, ""):
             yield f"{_phase_key(path, row.number)}.{problem}"
+
+
+def _depth_problems(path: GaitPath, rows: Sequence[PhaseRow]) -> Iterator[str]:
+    """Yield phases that end as soon as they begin, because they begin at until_depth_m or below and go no deeper."""
+    for number, phase in enumerate(path.phase):
+        depths_m = [row.at(at)[1] for row in rows if row.number == number for at in (0.0, 0.5, 1.0)]
+        if phase.until_depth_m is not None and depths_m and depths_m[0] == max(depths_m) >= phase.until_depth_m:
+            least = f"must be more than {depths_m[0]:.4g}, the depth of its beginning, below which it does not go"
+            yield f"{_phase_key(path, number)}.until_depth_m = {phase.until_depth_m:g}: {least}"
 
 
 def _poses(row: PhaseRow) -> Iterator[Pose]:

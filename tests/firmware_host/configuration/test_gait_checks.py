@@ -60,6 +60,11 @@ UNACCEPTED = {
     "half an ellipse": (stroke(curve="half_ellipse"), "phase 2 (stance).way_points"),
     "condition of a swing": (stroke(3, until_force_n=1.0), "phase 4 (swing).until_force_n"),
     "swing out of the mud": (stroke(2, until_force_n=1.0), "phase 3 (extraction).until_force_n"),
+    "swing after a pause": (
+        [*stroke(2, until_force_n=1.0)[:3], {"name": "pause", "duration_s": 0.5}, stroke()[3]],
+        "phase 3 (extraction).until_force_n",
+    ),
+    "depth of a phase that goes no deeper": (stroke(until_depth_m=0.02), "phase 2 (stance).until_depth_m = 0.02"),
     "swing of no time": (
         stroke(3, duration_s=None, speed_m_s=0.5, way_points=[point(-30.0, -0.0145)]),
         "phase 4 (swing).duration_s",
