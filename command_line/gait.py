@@ -49,7 +49,7 @@ def check(
     configuration = _configuration(config)
     path = read_gait(gait_document(gait))
     depth_m = max(path.depths_m, default=configuration.adaptation.initial_depth_m)
-    depths = filter(None, [depth_problem(configuration, each_m) for each_m in path.depths_m])
+    depths = [f"{path.name}: {wrong}" for each_m in path.depths_m if (wrong := depth_problem(configuration, each_m))]
     if problems := [*depths, *gait_problems(path, configuration, depth_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))

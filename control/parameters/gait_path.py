@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from control.bounds import Bounds, Meaning
 
+LONGEST_JSON = 3000  # characters of a gait on its way to the daemon
+
 
 @dataclass(frozen=True)
 class WayPoint:

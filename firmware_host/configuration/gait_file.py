@@ -11,7 +11,7 @@ from typing import Any
 from control.computing.suggestion import suggestion
 from control.gait.stride_table import crutching_parameters
 from control.parameters.gait_parameters import GaitParameters
-from control.parameters.gait_path import GaitPath
+from control.parameters.gait_path import LONGEST_JSON, GaitPath
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text
 
@@ -27,7 +27,11 @@ def gait_document(gait: str) -> dict[str, Any]:
     if not path.exists():
         message = f"there is no such file or shipped gait; {suggestion(gait, sorted(shipped))}"
         raise FileNotFoundError(ENOENT, message, gait)
-    return {"name": path.name} | parse_document(read_text(path), path)
+    document = {"name": path.name} | parse_document(read_text(path), path)
+    if (length := len(as_json(document))) > LONGEST_JSON:
+        most = f"must be at most {LONGEST_JSON}: leave out way-points or digits"
+        raise ConfigurationError([f"{path.name}: {length} characters as JSON, {most}"])
+    return document
 
 
 def read_gait(document: dict[str, Any]) -> GaitPath:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 from control.bounds import Bounds
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import LONGEST_JSON
 from control.records import JOINTS
 from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
@@ -174,7 +175,7 @@ GAIT_FILE = Parameter(
     "gait",
     Type.TEXT,
     "the tables of a gait file as JSON, in place of the configured gait; its depths_m count where no depth is given",
-    longest=3000,
+    longest=LONGEST_JSON,
 )
 FIXED_DEPTH = DEPTH._replace(meaning="depth of every stride", null_is_default=False, required=True)
 GAIT_UNITS = {

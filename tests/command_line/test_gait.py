@@ -55,13 +55,22 @@ def test_a_file_of_ones_own_is_accepted_or_named(tmp_path: Path, text: str, stat
     assert status == exit_codes.OK or "mine.toml" in found.stderr
 
 
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        (f"depths_m = [0.02, 0.06]\n{STANCE}", "depth 6 cm: must be from 0.5 to 5 cm, which is adaptation.max_depth_m"),
+        (f"depths_m = [0.02]\n{100 * STANCE}", "must be at most 3000"),
+    ],
+)
 @pytest.mark.parametrize("command", ["check", "simulate"])
-def test_a_depth_that_the_daemon_refuses_is_refused_by_the_check_too(tmp_path: Path, command: str) -> None:
+def test_what_the_daemon_refuses_is_refused_by_the_check_too(
+    tmp_path: Path, command: str, text: str, wrong: str
+) -> None:
     path = tmp_path / "mine.toml"
-    path.write_text(f"depths_m = [0.02, 0.06]\n{STANCE}{SWING}", encoding="utf-8")
+    path.write_text(text + SWING, encoding="utf-8")
     found = run("gait", command, str(path))
     assert found.returncode == exit_codes.CONFIGURATION
-    assert "adaptation.max_depth_m" in found.stderr
+    assert wrong in found.stderr and (command == "simulate" or "mine.toml" in found.stderr)
 
 
 def test_a_robot_that_cannot_be_armed_walks_no_gait_and_says_why(tmp_path: Path) -> None:
