@@ -5,6 +5,7 @@ model of it and of the records in it, which refuses unknown keys, other types, N
 bounds; each problem becomes one message with key, value and bound. Tables of an array are counted from 1.
 """
 
+import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
@@ -29,6 +30,7 @@ from control.bounds import Bounds
 from control.computing.suggestion import similar_name
 from firmware_host.configuration.file_problems import ConfigurationError, UnreadableFileError
 
+NUMBER_OF_TABLE = re.compile(r" \d+( \(.*?\))?")  # and its name, in a message
 LARGEST_FILE_BYTES = 100_000  # ten times those of a robot or a world; the rows' socket sends it in one packet
 
 
@@ -252,7 +254,7 @@ def _message(key: str, error: Any) -> str:
         case "less_than_equal":
             return f"{key} = {value}: must be at most {bounds['le']}"
         case "list_type":
-            return f"{key} = {value}: must be tables, each under [[{key}]]"
+            return f"{key} = {value}: must be tables, each under [[{NUMBER_OF_TABLE.sub('', key)}]]"
         case "model_type":
             return f"{key} = {value}: must be a table, {{ key = value, ... }}"
         case _:

@@ -76,6 +76,7 @@ def test_changes_are_what_the_file_sets_and_nothing_else(text: str, changes: dic
     [
         ("", "rail is missing"),
         ("rail = 1", "rail = 1: must be tables, each under [[rail]]"),
+        ("[[rail]]\nplank = 1", "rail 1.plank = 1: must be tables, each under [[rail.plank]]"),
         ("[[rail]]\n[[rail]]\nheight_m = 2", "rail 2.height_m = 2: must be at most 1.5"),
         ("[[rail]]\nheight_m = 0.4", "rail 1.height_m = 0.4: must be at least 0.5"),
         ("[[rail]]\n[[rail.plank]]\nlength_m = 1\n[[rail.plank]]\nnails = 1", "rail 1.plank 2.length_m is missing"),
