@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from command_line import exit_codes
+from command_line.screen import drop_output
 
 JSON = "--json"
 answers: list[None] = []  # one for each JSON that this command has printed
@@ -45,13 +46,16 @@ class Answer(NamedTuple):
     schema: str = ""  # a key of SCHEMAS, unless the report is a list or has its schema already
 
     def print(self, as_json: bool) -> int:
-        """Print it, and return the exit status."""
-        if not as_json:
-            print(*filter(None, [self.text]))
-        elif self.report is not None:
-            print_value(
-                {"schema": f"{self.schema}/{SCHEMAS[self.schema]}"} | self.report if self.schema else self.report
-            )
+        """Print it, and return the exit status, which a reader that has closed the output does not change."""
+        try:
+            if not as_json:
+                print(*filter(None, [self.text]), flush=True)
+            elif self.report is not None:
+                print_value(
+                    {"schema": f"{self.schema}/{SCHEMAS[self.schema]}"} | self.report if self.schema else self.report
+                )
+        except BrokenPipeError:
+            drop_output()
         return self.status
 
 
@@ -60,7 +64,7 @@ def print_value(value: Any) -> None:
     import json  # every command imports this module, and few print JSON
 
     answers.append(None)
-    print(json.dumps(value, allow_nan=False))
+    print(json.dumps(value, allow_nan=False), flush=True)
 
 
 def print_error(status: int, messages: Sequence[str]) -> None:

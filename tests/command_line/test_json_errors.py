@@ -1,6 +1,7 @@
 """With --json, every command that fails prints its reason as a JSON object with the same keys."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -68,3 +69,17 @@ def test_a_command_line_that_names_a_command_is_parsed_as_by_the_complete_parser
     all_commands = build_parser()
     for arguments in (["walk", "--depth", "3"], ["log", "list", "."], ["experiment", "walk", "--mud", "47"]):
         assert build_parser(arguments).parse_args(arguments) == all_commands.parse_args(arguments)
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("words", ["stop --socket /none", "status --socket /none --json"])
+def test_a_reader_that_has_closed_the_output_changes_no_exit_status(words: str, unbuffered: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer) as output:
+        ended = subprocess.run(
+            [sys.executable, "-m", "command_line.main", *words.split()],
+            stdout=output, stderr=subprocess.PIPE, text=True, timeout=LONGEST_S, check=False,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        )  # fmt: skip
+    assert ended.returncode == exit_codes.NO_DAEMON and "BrokenPipe" not in ended.stderr
