@@ -101,8 +101,9 @@ def _renew(
 def _conclude(command: str, report: dict[str, Any], status: int) -> Answer:
     """Say why the motion ended. It succeeded if the robot holds its pose and no fault ended it."""
     fault = report["fault"]
-    is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
-    if not is_sound:
+    if fault and fault["reaction"] in MILD:  # it ended nothing
+        fault = None
+    if report["mode"] != "hold" or report["notice"] or fault:
         complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
         status = status or exit_codes.REFUSED
     return mode_answer(command, report["mode"], status=status)

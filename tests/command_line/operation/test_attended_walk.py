@@ -48,7 +48,7 @@ STOPPED = "stopped by drive_silent: The left_sweep drive is silent. Check it."
          exit_codes.REFUSED, STOPPED),
         ([report("stopping"), report("idle", notice=STOPPED)], exit_codes.REFUSED, STOPPED),
         ([report("fault", "It is silent.")], exit_codes.REFUSED, "It is silent."),
-        ([report("idle")], exit_codes.REFUSED, "the torque was switched off"),
+        ([report("idle", "It moves.", reaction="none")], exit_codes.REFUSED, "the torque was switched off"),
         ([report("hold", "No current.")], exit_codes.REFUSED, "No current."),
         ([report("walking"), report("hold", "The disk is full.", reaction="warn")], exit_codes.OK, ""),
     ],
