@@ -17,6 +17,7 @@ import runpy
 import sys
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from pathlib import Path
 from traceback import extract_tb
 from typing import Annotated, Any
@@ -46,22 +47,23 @@ def run(
     take_over: TakeOver = False,
 ) -> Answer:
     """Move by a control law of your own; the robot stops with this command, and with a law that fails or is late."""
-    chosen, rate_hz = load_law(law)
-    if rate_hz and strides:
-        raise usage_error(f"--strides {strides}: must be left out, as this law has RATE_HZ and moves single joints")
-    with StatusClient(socket) as client:
-        if rate_hz:
-            return _move_joints(client, chosen, rate_hz, take_over)
-        read = client.call("status")["strides_closed"]
+    with redirect_stdout(sys.stderr if json else sys.stdout):  # what the law prints is no JSON
+        chosen, rate_hz = load_law(law)
+        if rate_hz and strides:
+            raise usage_error(f"--strides {strides}: must be left out, as this law has RATE_HZ and moves single joints")
+        with StatusClient(socket) as client:
+            if rate_hz:
+                return _move_joints(client, chosen, rate_hz, take_over)
+            read = client.call("status")["strides_closed"]
 
-        def order(client: StatusClient, status: Report) -> None:
-            nonlocal read
-            closed = client.call("strides", since=read)
-            read += len(closed)
-            if closed and (answer := order_of(chosen, closed)) is not None:
-                _give(client, "stride", answer, "walking")
+            def order(client: StatusClient, status: Report) -> None:
+                nonlocal read
+                closed = client.call("strides", since=read)
+                read += len(closed)
+                if closed and (answer := order_of(chosen, closed)) is not None:
+                    _give(client, "stride", answer, "walking")
 
-        return attend(client, json, {"depth_m": depth / 100.0, "strides": strides, "take_over": take_over}, order)
+            return attend(client, json, {"depth_m": depth / 100.0, "strides": strides, "take_over": take_over}, order)
 
 
 def _move_joints(client: StatusClient, law: Law, rate_hz: float, take_over: bool) -> Answer:

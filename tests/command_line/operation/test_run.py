@@ -1,5 +1,6 @@
 """A user's control law orders the strides of an attended walk or moves joints, and one that fails stops the robot."""
 
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -106,6 +107,14 @@ def test_a_law_is_called_once_for_each_stride_that_closed(
     assert answer.print(as_json=False) == exit_codes.OK
     assert answer.report == {"command": "run", "mode": "hold", "notice": ""}
     assert daemon.orders == list(orders)
+
+
+def test_with_json_a_law_prints_to_standard_error(
+    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run.run(law(tmp_path, "print('thinking')"), socket=tmp_path, json=True).print(as_json=True)
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["mode"] == "hold" and "thinking" in printed.err
 
 
 def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
