@@ -117,7 +117,9 @@ def _answer_of(law: Law, seen: Any) -> Any:
     begun_s = time.monotonic()
     try:
         answer = law(seen)
-    except (Exception, SystemExit) as problem:  # noqa: BLE001 - any error of a user's law
+    except KeyboardInterrupt:
+        raise
+    except BaseException as problem:  # any error of a user's law, such as SystemExit or asyncio's CancelledError
         calls = extract_tb(problem.__traceback__)[1:]  # after the one above
         own = [f" in line {call.lineno}" for call in calls if call.filename == calls[0].filename]
         raise LawError(f"the law raised {type(problem).__name__}{''.join(own[-1:])}: {problem}") from problem

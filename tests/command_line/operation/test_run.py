@@ -129,6 +129,7 @@ def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.
     [
         ("return 1 / 0", ("ZeroDivisionError", "line 3")),
         ("raise SystemExit(0)", ("SystemExit", "line 3")),
+        ("raise __import__('asyncio').CancelledError", ("CancelledError", "line 3")),
         ("return __import__('json').loads('')", ("JSONDecodeError", "line 3")),
         ("return 'deep'", ("'deep'",)),
         ("return {'depth_m': 0.03, 4: 'disarm'}", ("4: 'disarm'",)),
