@@ -63,13 +63,13 @@ class SimulatedWalk:
             lambda: loop.learning.strides_closed > closed or loop.mode is not Mode.WALKING, LONGEST_STRIDE_S
         )
         flippers = len(loop.configuration.rig.flippers)
-        walks = loop.mode is Mode.WALKING
+        ended = loop.fault.message if loop.fault else loop.mode.name.lower()
         return Stride(
             reports=[stride_report(each.estimate) for each in loop.learning.strides[-flippers:]],
             advance_m=plant.body_m - begun_m,
             duration_s=lockstep.now_s - begun_s,
             energy_j=fsum(max(0.0, joint.work_j) for joint in self._energy.joints),
-            fault="" if walks else str(loop.fault or loop.mode.name.lower()),
+            fault="" if loop.mode is Mode.WALKING else ended,
             body_m=plant.body_m,
         )
 

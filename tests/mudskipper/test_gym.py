@@ -44,11 +44,15 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
             advanced_m += info["advance_m"]
             assert reward == pytest.approx(100.0 * info["advance_m"] - 0.1 * info["energy_j"])
             assert isinstance(walk._walk, SimulatedWalk)
-            sweep_deg = walk._walk._lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
+            lockstep = walk._walk._lockstep
+            sweep_deg = lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
             assert sweep_deg == pytest.approx(ACTION["sweep_angle_deg"][int(action[1] > 0.0)])
         assert over and not fault
         assert felt[9] == pytest.approx(2.75, abs=0.5)  # cm of depth: the middle of its range
         assert advanced_m == pytest.approx(info["body_m"] - begun_m) and advanced_m > 0.08
+        lockstep.late_ticks = 1000
+        _, _, fault, _, info = walk.step(np.zeros(3, np.float32))
+        assert fault and info["fault"].startswith("The loop")  # its message, as of a daemon
 
 
 @pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
