@@ -100,13 +100,17 @@ class DaemonWalk:
                 )
             client.walk(depth_m=depth_m)
             self._before = client.wait_for("walking")
+            self._body_m: float | None = self._before["body_x_m"]  # where it was seen last, if ever
             self._connection = begun.pop_all()
 
     def order(self, depth_m: float, gait: Mapping[str, float]) -> None:
         self._client.stride(depth_m, **gait)
 
     def walk_stride(self) -> Stride:
-        """Wait for the end of the stride; the time since the last one counts too, with the power at its end."""
+        """Wait for the end of the stride; the time since the last one counts too, with the power at its end.
+
+        A stride that ends without a pose has no advance: the next one with a pose has that of both.
+        """
         first = last = self._before
         work_j = [0.0] * len(first["drives"])
         while last["strides_closed"] == first["strides_closed"] and last["mode"] == "walking":
@@ -116,22 +120,24 @@ class DaemonWalk:
             for joint, drive in enumerate(last["drives"]):
                 power_w = drive["torque_command_nm"] * (drive["velocity_rad_s"] or 0.0)
                 work_j[joint] += power_w * (last["now_s"] - before["now_s"])
-        self._before = last
+        self._before, begun_m = last, self._body_m
+        if last["body_x_m"] is not None:
+            self._body_m = last["body_x_m"]
         flippers = len(last["drives"]) // 2
         reports = self._client.strides(since=max(last["strides_closed"] - flippers, 0))
         fault = last["fault"]["message"] if last["fault"] else last["mode"]
         return Stride(
             reports=reports,
-            advance_m=(last["body_x_m"] or 0.0) - (first["body_x_m"] or 0.0),
+            advance_m=0.0 if begun_m is None else (self._body_m or 0.0) - begun_m,
             duration_s=last["now_s"] - first["now_s"],
             energy_j=fsum(max(0.0, each) for each in work_j),
             fault="" if last["mode"] == "walking" else fault,
-            body_m=last["body_x_m"] or 0.0,
+            body_m=self._body_m or 0.0,
         )
 
     def view(self) -> tuple[float, float, float]:
         sweep, lift = self._before["drives"][:2]
-        return sweep["angle_rad"], lift["angle_rad"], self._before["body_x_m"] or 0.0
+        return sweep["angle_rad"], lift["angle_rad"], self._body_m or 0.0
 
     def end(self) -> None:
         """Stop the robot, which walks on otherwise, and let its operator arm it again."""

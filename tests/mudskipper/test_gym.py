@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import gymnasium
 import numpy as np
@@ -17,7 +18,7 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from mudskipper.client import Client
 from mudskipper.ground_and_gait import Ground
 from mudskipper.gym import ACTION, MudWalk, _observation
-from mudskipper.stride_walks import SimulatedWalk, Stride
+from mudskipper.stride_walks import DaemonWalk, SimulatedWalk, Stride
 from tests.folders import ROOT
 from tests.running_bench import Bench
 
@@ -53,6 +54,22 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
         lockstep.late_ticks = 1000
         _, _, fault, _, info = walk.step(np.zeros(3, np.float32))
         assert fault and info["fault"].startswith("The loop")  # its message, as of a daemon
+
+
+def test_a_daemon_s_robot_whose_pose_is_missing_for_a_stride_has_its_advance_in_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drive = {"torque_command_nm": 0.0, "velocity_rad_s": None, "angle_rad": 0.0}
+    rest = {"mode": "walking", "fault": None, "drives": [drive] * 4}
+    walking, *later = (
+        rest | {"strides_closed": 2 * number, "now_s": float(number), "body_x_m": x_m}
+        for number, x_m in enumerate([1.2, 1.3, None, 1.5])
+    )
+    reports = iter([{"mode": "hold"}, *later])
+    client = Mock(status=lambda: next(reports), wait_for=lambda mode: walking)
+    monkeypatch.setattr("mudskipper.stride_walks.Client", lambda socket, lease_s: client)
+    walk = DaemonWalk({}, 1, 0.02, Path())
+    assert [walk.walk_stride().advance_m for _ in later] == pytest.approx([0.1, 0.0, 0.2])
 
 
 @pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
