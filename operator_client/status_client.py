@@ -24,6 +24,7 @@ ANSWER_S = 5.0
 OPERATORS = "-operators"  # in the name of their own socket, as the daemon has it
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 CLOSED = "it is ending, or made room for another client; try again"
+ENDED = "this client is closed, as by the end of its `with` statement: make another one"
 SILENT = "'systemctl status mudskipper' shows more"
 TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
@@ -107,7 +108,8 @@ class StatusClient:
         except ConnectionError as problem_reading:
             raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading
         except OSError as problem_reading:
-            raise DroppedError(f"the daemon on {self._path} does not answer: {SILENT}") from problem_reading
+            silent = f"the daemon on {self._path} does not answer: {SILENT}"
+            raise DroppedError(ENDED if self._socket.fileno() < 0 else silent) from problem_reading
         except (ValueError, TypeError, KeyError, msgpack.UnpackException) as problem_reading:
             raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon") from problem_reading
 

@@ -125,6 +125,9 @@ def test_a_connection_that_the_daemon_closed_is_reported(ends: Ends, before: int
     connection.close()
     with pytest.raises(DroppedError, match="closed the connection: it is ending, or made room"):
         client.call("status")
+    client.close()
+    with pytest.raises(DroppedError, match="this client is closed"):
+        client.call("status")
 
 
 def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
