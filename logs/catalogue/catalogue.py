@@ -38,7 +38,7 @@ from logs.files.log_error import LogError, Watch
 from logs.files.whole_files import hidden_path, is_hidden, whole_file
 
 NAME = "catalogue.parquet"
-VERSION = 3  # of COLUMNS and their meaning; an older catalogue is made again
+VERSION = 4  # of COLUMNS and their meaning; an older catalogue is made again
 VERSION_KEY = "mudskipper_catalogue"
 MOST_DIGITS = 9  # of a version; one with more is damage
 TRIALS_TABLE = "trials"

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class MudEntry(NamedTuple):
-    """A mud that the robot felt, in the order of the walk; the log's event "another mud" separates two."""
+    """A mud that the robot felt in one walk; the log's event "another mud" separates two."""
 
     strides: int
     k_p: float | None  # N/m³, as the other two: medians of the valid ones

@@ -101,17 +101,24 @@ def _travel(walks: Sequence[Ticks]) -> tuple[float | None, float | None]:
 
 
 def _muds(log: Log, walks: Sequence[Ticks]) -> list[MudEntry]:
-    borders_s = [event["stamp_s"] for event in log.events if event["text"].startswith(ANOTHER_MUD)]
+    """Each walk begins another mud: the robot has forgotten the one before, and may have been moved."""
+    starts_s = [float(walk["stamp_s"][0]) for walk in walks[1:]]
+    return [mud for span_s in pairwise([-inf, *starts_s, inf]) for mud in _muds_between(log, walks, *span_s)]
+
+
+def _muds_between(log: Log, walks: Sequence[Ticks], from_s: float, to_s: float) -> list[MudEntry]:
+    found_s = [event["stamp_s"] for event in log.events if event["text"].startswith(ANOTHER_MUD)]
+    borders_s = [from_s, *(stamp_s for stamp_s in found_s if from_s < stamp_s < to_s), to_s]
     groups = [
         [stride for stride in log.strides if begin_s <= stride["stamp_s"] < end_s]
-        for begin_s, end_s in pairwise([-inf, *borders_s, inf])
+        for begin_s, end_s in pairwise(borders_s)
     ]
     muds: list[Rows] = [*filter(None, groups), []]
     return [_mud(strides, following, walks) for strides, following in pairwise(muds)]
 
 
 def _mud(strides: Rows, following: Rows, walks: Sequence[Ticks]) -> MudEntry:
-    """A stride lasts from its insertion to the next one; the last of the log has no duration."""
+    """A stride lasts from its insertion to the next one; the last of a walk has no duration."""
     starts_s, ends_s = ([stride["t_start_s"] for stride in rows] for rows in (strides, following))
     begin_s, end_s = min(starts_s), min(ends_s, default=max(starts_s))
     there = [walk[(walk["stamp_s"] >= begin_s) & (walk["stamp_s"] <= end_s)] for walk in walks]

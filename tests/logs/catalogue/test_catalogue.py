@@ -8,6 +8,7 @@ from statistics import median
 import duckdb
 import pytest
 
+from control.modes import Mode
 from firmware_host.log.log_file import EXPORTED, LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from logs.catalogue import catalogue as catalogue_module
@@ -78,6 +79,15 @@ def test_the_event_of_another_mud_begins_a_mud_with_its_own_medians_and_speed(fo
     for mud, strides in zip(muds, (log.strides[:2], log.strides[2:]), strict=True):
         assert (mud.strides, mud.k_p) == (len(strides), median(stride["k_p"] for stride in strides))
         assert mud.speed_m_s == pytest.approx(0.12 / 1.57, rel=0.02)  # a step in the time between two insertions
+
+
+def test_each_walk_begins_another_mud_as_the_robot_may_have_been_moved(folder: Path) -> None:
+    walk, log = updated(folder)[f"{DONE}/walk.mcap"], read_log(WALK)
+    stopped = (log.ticks["stamp_s"] > log.strides[2]["stamp_s"]) & (log.ticks["stamp_s"] < log.strides[4]["t_start_s"])
+    log.ticks["mode"][stopped] = Mode.HOLD
+    entry = entry_of_log(walk, log)
+    assert (entry.walks, [mud.strides for mud in entry.muds]) == (2, [4, 2])
+    assert entry.muds[0].speed_m_s == pytest.approx(0.12 / 1.57, rel=0.02)
 
 
 def test_a_lower_bound_counts_in_no_median(folder: Path) -> None:
