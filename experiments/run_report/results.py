@@ -143,7 +143,7 @@ def ground_finding(law: LawEvidence | None, strides: int) -> list[str]:
         return []
     wrong = " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law.errors.items())
     finding = "no known law explains" if law.name == UNDECIDED else f"the law of {law.name} explains"
-    return [f"{finding} how k_p, k_s and k_e compare: each is predicted wrong from the other two, as {wrong}."]
+    return [f"{finding} how the coefficients compare: each is predicted wrong from the others, as {wrong}."]
 
 
 def _depth_findings(fresh: DataFrame) -> list[str]:
