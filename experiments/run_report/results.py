@@ -27,7 +27,7 @@ from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
-from experiments.reports.depth_law import fit_depth_law, law_finding, re_entered
+from experiments.reports.depth_law import NARROWEST, fit_depth_law, law_finding, re_entered
 from experiments.reports.mud_names import mud_key
 from experiments.run_report.run import Run
 from firmware_host.operator.reports import law_report
@@ -233,9 +233,13 @@ def _between(first: Run, before: Entry, other: Run, after: Entry) -> Iterator[En
                 "other": b,
                 "difference": b - a,
                 "std_error": None if a_error is None or b_error is None else hypot(a_error, b_error),
-                "like_depths": before["shallowest_m"] <= after["deepest_m"]
-                and after["shallowest_m"] <= before["deepest_m"],
+                "like_depths": all(_is_like(before[name], after[name]) for name in ("shallowest_m", "deepest_m")),
             }
+
+
+def _is_like(one_m: float, other_m: float) -> bool:
+    """Return whether two depths are so close that the coefficients of a depth law would hardly differ."""
+    return max(one_m, other_m) < NARROWEST * min(one_m, other_m)
 
 
 def _quantities(before: Entry, after: Entry, same_robot: bool) -> Iterator[tuple[str, Value, Value]]:

@@ -175,6 +175,14 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
 
 
+@pytest.mark.parametrize(("depths_m", "alike"), [([0.031, 0.034], True), ([0.02, 0.03, 0.042], False)])
+def test_runs_are_of_like_depths_where_both_ends_are_alike(depths_m: list[float], alike: bool) -> None:
+    """The means of 2 to 4.2 cm and of 3 cm are no means of one depth, though one range contains the other."""
+    other = run_with([1.0e6] * len(depths_m), "b")
+    other = replace(other, strides=other.strides.assign(depth_m=depths_m))
+    assert between(run_with([1.0e6, 1.1e6], "a"), other)["k_p"]["like_depths"] is alike  # the first is at 3 cm
+
+
 def test_a_run_that_is_faster_than_one_backward_differs_by_a_positive_percentage() -> None:
     runs = [run_of([stride("A", step_m=step_m, duration_s=1.0)], name=str(step_m)) for step_m in (-0.1, 0.1)]
     table = comparison_result(runs, [headline_of(run) for run in runs]).tables[1].rows
