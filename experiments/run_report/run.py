@@ -8,7 +8,7 @@ the robot noticed, described by its k_p.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -148,12 +148,13 @@ def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list
 
 
 def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk]) -> MudLayout | None:
-    """Return the layout by the positions of this log. Raises LogError for several muds without any position."""
+    """Return the layout by the positions of this log. Raises LogError for several muds where these are not known."""
     if layout is None or not walks:
         return layout
     known = np.concatenate([walk.body_x_m[np.isfinite(walk.body_x_m)] for walk in walks])
-    if not len(known) and len(layout.names) > 1:
-        raise LogError(f"{path}: has no position of the body, so its strides cannot be assigned to muds: name one mud")
+    missing = "position of the body" if not len(known) else "sweep angle in its head" if isnan(walks[0].reach_m) else ""
+    if missing and len(layout.names) > 1:
+        raise LogError(f"{path}: has no {missing}, so its strides cannot be assigned to muds: name one mud")
     return layout.beginning_at(float(known[0])) if len(known) else layout
 
 

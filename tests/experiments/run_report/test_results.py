@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from math import hypot, sqrt
+from math import hypot, nan, sqrt
 from pathlib import Path
 from statistics import fmean
 from types import SimpleNamespace
@@ -29,11 +29,11 @@ from experiments.run_report.results import (
     run_labels,
     speed_of,
 )
-from experiments.run_report.run import Run, _trials_in, read_runs
+from experiments.run_report.run import Run, _placed, _trials_in, read_runs
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.trial import BEGUN, OperatorReport
 from logs.fault_history import LoggedCause
-from logs.files.log_error import unwatched
+from logs.files.log_error import LogError, unwatched
 from logs.files.log_reader import read_log
 from tests.experiments.run_report.synthetic_runs import run_of, stride
 from tests.recorded_walks import record_walks
@@ -173,6 +173,14 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_with([1.0e6, 1.1e6], mud="48.50"))) == {SPEED, "k_p", "k_s", "k_e"}
     assert between(first, run_with([1.0e6, 1.1e6], mud="pond")) == {}
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
+
+
+def test_several_muds_need_the_reach_of_the_plates_which_a_csv_without_settings_does_not_have() -> None:
+    walk: Any = SimpleNamespace(body_x_m=np.array([0.1]), reach_m=nan)
+    two, one = ([("A", 0.6), ("B", 0.6)], [("A", 0.6)])
+    with pytest.raises(LogError, match="has no sweep angle in its head.*name one mud"):
+        _placed(Path("walk.csv"), layout_of_lengths(two), [walk])
+    assert _placed(Path("walk.csv"), layout_of_lengths(one), [walk]) is not None
 
 
 @pytest.mark.parametrize(("depths_m", "alike"), [([0.031, 0.034], True), ([0.02, 0.03, 0.042], False)])
