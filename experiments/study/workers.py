@@ -10,7 +10,8 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
-from multiprocessing import active_children
+from multiprocessing import active_children, parent_process
+from threading import Thread
 from typing import Any, TypeVar
 
 from experiments.study.session import Show
@@ -58,7 +59,7 @@ def _run_in_pool(
     Ctrl-C reaches every process of a terminal; a worker would end its trial and begin the next. Raises
     BrokenProcessPool where a process ended in the middle of a trial.
     """
-    pool = ProcessPoolExecutor(processes, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(processes, initializer=_begin_worker)
     try:
         indices = {pool.submit(trial): index for index, trial in trials.items()}
         pending = set(indices)
@@ -73,6 +74,19 @@ def _run_in_pool(
         raise
     finally:
         pool.shutdown()
+
+
+def _begin_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End a worker whose parent was killed: it would wait for its next trial for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def run_parallel(

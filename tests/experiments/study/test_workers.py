@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from functools import partial
+from multiprocessing import Pipe, get_context
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,18 @@ def test_the_trials_of_a_lost_worker_are_repeated(tmp_path: Path) -> None:
     trials = [partial(killed_at_first, mark) for mark in marks]
     results = run_parallel(trials, ignore, TWO, lambda index, result: kept.append(index))
     assert results == ["done"] * 4 and sorted(kept) == [0, 1, 2, 3]
+
+
+def test_the_workers_of_a_program_that_is_killed_end(tmp_path: Path) -> None:
+    begun, (reader, writer) = tmp_path / "begun", Pipe(duplex=False)
+    trials = [partial(begun.touch), partial(late, 60.0)]
+    program = get_context("fork").Process(target=run_parallel, args=(trials, ignore, TWO))
+    program.start()
+    wait_for_file(begun)
+    program.kill()
+    program.join()
+    writer.close()
+    assert reader.poll(20.0)  # no process holds the other end any more
 
 
 def test_a_trial_that_ends_every_worker_is_given_up_with_a_message() -> None:
