@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from control.records import StrideEstimate
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis
+from logs.files.log_error import ADVICE
 from logs.files.log_reader import Log, read_logs
 from logs.files.log_summary import trial_of
 from logs.lab.body_track import VERTICAL_AXIS
@@ -115,6 +116,7 @@ def recording_of_log(path: Path, log: Log, surface_error_m: float | None = None)
         current_a=ticks["current_a"],
         rows=np.full(len(ticks), True),
         replay=replay,
+        findings=() if log.complete else (f"its end is missing: everything up to there counts; {ADVICE}",),
         mud=trial_of(log).get("mud", ""),
         torque_scale=configuration.flipper_drives[0].sweep_constant_nm_a / PAPER_CONSTANT_NM_A,
     )

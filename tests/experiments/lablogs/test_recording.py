@@ -90,6 +90,13 @@ def test_a_log_of_a_robot_with_one_flipper_shows_its_mud(tmp_path: Path) -> None
     assert read_recording([tmp_path / "one.mcap"]).has_evidence_of_mud()
 
 
+def test_a_log_without_its_end_is_a_finding(two_walks: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.mcap").write_bytes(two_walks.read_bytes()[:-1000])
+    assert read_recording([two_walks]).findings == ()
+    (finding,) = read_recording([tmp_path / "cut.mcap"]).findings
+    assert "its end is missing" in finding
+
+
 def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(two_walks: Path) -> None:
     recording, strides = read_recording([two_walks]), replay_files([two_walks]).strides
     assert recording.has_evidence_of_mud() and not recording.fixed_base
