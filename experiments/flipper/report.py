@@ -126,9 +126,10 @@ def _report_of(by_mud: Trials, configuration: Configuration, truth: TruthOfMud |
 
 
 def _falls_with_water(muds: Sequence[Mapping[str, Any]], name: str) -> bool | None:
-    """Return whether the coefficient falls with water, as in the paper; None where the names are no water contents."""
+    """Return whether the coefficient falls with water, as in the paper; None without two values in known waters."""
     waters = waters_of([mud["mud"] for mud in muds]) or ()
-    known = sorted((water, mud[name].value) for water, mud in zip(waters, muds, strict=False) if mud[name].trials)
+    found = [(water, mud[name]) for water, mud in zip(waters, muds, strict=False)]
+    known = sorted((water, each.value) for water, each in found if each.trials and not each.at_least)
     return all(drier > wetter for (_, drier), (_, wetter) in pairwise(known)) if len(known) > 1 else None
 
 

@@ -188,6 +188,12 @@ def test_the_report_says_whether_coefficients_fall_with_water(
     assert report(entries_of(values), tuple(values)[::-1])["falls_with_water"]["k_p"] is falls
 
 
+def test_a_lower_bound_does_not_show_whether_a_coefficient_falls_with_water() -> None:
+    entries = entries_of({"47.6": [1e6], "51.2": [2e6]})
+    entries["47.6/1"]["strides"][DEFAULT][0]["k_p"]["at_least"] = True
+    assert report(entries, ("47.6", "51.2"))["falls_with_water"]["k_p"] is None
+
+
 def test_one_stride_of_each_trial_does_not_show_whether_its_claim_is_right() -> None:
     entries = entries_of({"47.6": [2e6, 2.2e6]})
     for entry in entries.values():
