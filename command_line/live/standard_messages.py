@@ -78,12 +78,13 @@ def variances(x_is_measured: bool) -> Any:
 
 
 class StandardMessages:
-    """Owns the latest stride of each flipper and the latest event."""
+    """Owns the latest stride of each flipper, the latest event, and the position of the body."""
 
     def __init__(self, geometry: FlipperGeometry, rig: Rig = TWO_FLIPPERS) -> None:
         self._geometry, self._rig = geometry, rig
         self._strides: dict[str, Mapping[str, Any]] = {}
         self._event = ""
+        self._body_x_m = 0.0  # measured last
         self._last_tick, self._diagnosed_s = -TICKS_A_MESSAGE, -inf
 
     def of_row(self, row: LiveRow, stamp_ns: int, wanted: bool = True) -> dict[str, bytes]:
@@ -119,7 +120,7 @@ class StandardMessages:
         return {topic: bytes(ROS.serialize_cdr(message, TOPICS[topic])) for topic, message in messages.items()}
 
     def _messages(self, stamp: Any, tick: Row) -> Iterator[tuple[str, Any]]:
-        """Yield all but the diagnostics. Without a pose the body stands at the track's begin: viewers draw no NaN."""
+        """Yield all but the diagnostics. While a pose is missing the body stands still: viewers draw no NaN."""
 
         def header(frame: str) -> Any:
             return make("std_msgs/Header", stamp, frame)
@@ -133,13 +134,14 @@ class StandardMessages:
         yield "/joint_states", make("sensor_msgs/JointState", header(BASE), list(self._rig.joints), *signals)
         body_x_m, angles_rad = float(tick["body_x_m"]), [float(angle) for angle in tick["angle_rad"]]
         if isfinite(body_x_m):
+            self._body_x_m = body_x_m
             position = make("geometry_msgs/Point", body_x_m, 0.0, self._geometry.axis_height_m)
             pose = make("geometry_msgs/Pose", position, make("geometry_msgs/Quaternion", *UPRIGHT))
             measured = make("geometry_msgs/PoseWithCovariance", pose, variances(x_is_measured=True))
             still = make("geometry_msgs/Twist", vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
             twist = make("geometry_msgs/TwistWithCovariance", still, variances(x_is_measured=False))
             yield "/odom", make("nav_msgs/Odometry", header(ODOM), BASE, measured, twist)
-        base_m = (body_x_m if isfinite(body_x_m) else 0.0, 0.0, self._geometry.axis_height_m)
+        base_m = (self._body_x_m, 0.0, self._geometry.axis_height_m)
         frames = [transform(ODOM, BASE, base_m, UPRIGHT)]
         for number, flipper in enumerate(self._rig.flippers):
             edge = f"{flipper}_edge"

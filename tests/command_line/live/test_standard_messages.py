@@ -1,6 +1,7 @@
 """An independent reader finds named scalars, poses, forces, frames and diagnostics in what viewers are served."""
 
 from itertools import pairwise
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_ticks_have_messages_once_their_number_begins_again(log: Log) -> None:
     standard, first = StandardMessages(GEOMETRY), log.ticks[0]
     standard.of_tick(0, {name: first[name] for name in log.ticks.dtype.names or ()} | {"tick": 2**32 - 1})
     assert standard.is_due(0) and not standard.is_due(2**32 - 1)
+
+
+def test_a_body_whose_pose_is_missing_stays_where_it_was_measured_last(log: Log) -> None:
+    standard, first, positions_m = StandardMessages(GEOMETRY), log.ticks[0], []
+    tick = {name: first[name] for name in log.ticks.dtype.names or ()}
+    for body_x_m in (nan, 1.2, nan):
+        messages = standard.of_tick(0, tick | {"body_x_m": body_x_m})
+        assert ("/odom" in messages) == isfinite(body_x_m)
+        frames: Any = ROS.deserialize_cdr(messages["/tf"], TOPICS["/tf"])
+        positions_m.append(frames.transforms[0].transform.translation.x)
+    assert positions_m == [0.0, 1.2, 1.2]
 
 
 def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
