@@ -130,9 +130,11 @@ class StandardMessages:
             placed = make("geometry_msgs/Transform", vector(*position_m), turned)
             return make("geometry_msgs/TransformStamped", header(parent), child, placed)
 
-        signals = (np.array(tick[name], float) for name in ("angle_rad", "velocity_rad_s", "torque_command_nm"))
-        yield "/joint_states", make("sensor_msgs/JointState", header(BASE), list(self._rig.joints), *signals)
         body_x_m, angles_rad = float(tick["body_x_m"]), [float(angle) for angle in tick["angle_rad"]]
+        heard = np.isfinite(angles_rad)  # nothing is known of the others before their drives are switched on
+        signals = (np.array(tick[name], float)[heard] for name in ("angle_rad", "velocity_rad_s", "torque_command_nm"))
+        names = [joint for joint, is_heard in zip(self._rig.joints, heard, strict=True) if is_heard]
+        yield "/joint_states", make("sensor_msgs/JointState", header(BASE), names, *signals)
         if isfinite(body_x_m):
             self._body_x_m = body_x_m
             position = make("geometry_msgs/Point", body_x_m, 0.0, self._geometry.axis_height_m)
@@ -144,6 +146,8 @@ class StandardMessages:
         base_m = (self._body_x_m, 0.0, self._geometry.axis_height_m)
         frames = [transform(ODOM, BASE, base_m, UPRIGHT)]
         for number, flipper in enumerate(self._rig.flippers):
+            if not all(heard[2 * number : 2 * number + 2]):
+                continue
             edge = f"{flipper}_edge"
             position_m, quaternion = flipper_pose(self._geometry, flipper, *angles_rad[2 * number : 2 * number + 2])
             frames.append(transform(BASE, edge, position_m, UPRIGHT))

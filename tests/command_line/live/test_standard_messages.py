@@ -71,6 +71,19 @@ def test_a_body_whose_pose_is_missing_stays_where_it_was_measured_last(log: Log)
     assert positions_m == [0.0, 1.2, 1.2]
 
 
+def test_joints_that_were_not_heard_yet_are_left_out(log: Log) -> None:
+    first = log.ticks[0]
+    tick = {name: first[name] for name in log.ticks.dtype.names or ()}
+    messages = StandardMessages(GEOMETRY).of_tick(0, tick | {"angle_rad": [0.1, nan, 0.3, 0.4]})
+    decoded: dict[str, Any] = {
+        topic: ROS.deserialize_cdr(content, TOPICS[topic]) for topic, content in messages.items()
+    }
+    state, frames = decoded["/joint_states"], decoded["/tf"].transforms
+    assert state.name == ["left_sweep", "right_sweep", "right_adduction"] and state.position.tolist() == [0.1, 0.3, 0.4]
+    assert [frame.child_frame_id for frame in frames] == ["base_link", "right_edge", "right_flipper"]
+    assert not {"/left/pose", "/left/force"} & decoded.keys()
+
+
 def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
     states = decoded["/joint_states"]
     assert all(tuple(state.name) == JOINTS for _, state in states)
