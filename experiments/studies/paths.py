@@ -28,12 +28,23 @@ from experiments.reports.coefficient_table import compared_frame, compared_rows
 from experiments.reports.error_table import Row, error_frame
 from experiments.studies.estimation import ENDLESS_M
 from experiments.studies.grounds import GROUNDS, disturbances_on
-from experiments.study.option import Option
+from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result, Table
 from experiments.study.trials import Trials
 from experiments.trials.load_cell_truth import REVERSAL_FRACTION, FlipperTruths, true_strides
 from experiments.trials.predicted_load import LoadError, load_errors
-from experiments.trials.trial import LATENCY_S, TORQUE_ERROR, WALKING, Setup, Trial, replay_trial, run_trial
+from experiments.trials.trial import (
+    LATENCY_S,
+    TORQUE_ERROR,
+    WALKING,
+    Setup,
+    Trial,
+    configuration_of,
+    replay_trial,
+    run_trial,
+)
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.gait_checks import gait_problems
 from firmware_host.configuration.gait_file import as_json, gait_document, read_gait
 from firmware_host.operator.reports import stride_report
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
@@ -58,7 +69,8 @@ def study(
     """The coefficients of a ground from paths other than the crutching gait."""
     documents = {name: gait_document(name) for name in gait}
     for document in documents.values():
-        read_gait(document)  # refused before anything runs
+        if problems := list(gait_problems(read_gait(document), configuration_of(WALKING), depth / 100.0)):
+            raise ConfigurationError(problems)  # before anything runs
     walked = {"depth_m": depth / 100.0, "strides": strides}
     rows = [
         {"gait": name, "document": as_json(document), "ground": each, "seed": seed, **walked}
@@ -67,7 +79,10 @@ def study(
         for seed in range(1, seeds + 1)
     ]
     walks = trials.run(walk, rows)
-    found = with_load_errors([row for each in walks["estimates"] for row in each])
+    estimates = [row for each in walks["estimates"] for row in each]
+    if not estimates:
+        raise OptionError("no flipper of these walks was in the ground, so there is nothing to evaluate")
+    found = with_load_errors(estimates)
     by_law = found.assign(mud=found["mud"].str.partition("-")[0])
     speeds = walks.groupby(["gait", "ground"], sort=False)[["speed_cm_s", "stuck"]].mean().reset_index()
     return Result(

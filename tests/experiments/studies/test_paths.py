@@ -9,7 +9,9 @@ from pandas import DataFrame
 from control.records import COEFFICIENTS
 from experiments.studies.grounds import GROUNDS
 from experiments.studies.paths import errors_of, study, walk, with_load_errors
+from experiments.study.option import OptionError
 from experiments.study.trials import Trials
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.gait_file import SHIPPED, as_json, gait_document
 from simulation.mud.clay import Clay
 
@@ -34,6 +36,20 @@ def test_a_gait_file_that_was_edited_is_walked_again(tmp_path: Path) -> None:
         (table, *_) = study(trials, gait=(f"{tmp_path}/own.toml",), ground=("clay-1.4",), strides=3, seeds=1).tables
         speeds_cm_s += [*table.rows["speed_cm_s"]]
     assert speeds_cm_s[0] < 0.0 < speeds_cm_s[1]
+
+
+@pytest.mark.parametrize(
+    ("swept_deg", "depth_m", "wrong"), [(-70.0, 0.0, "limits.sweep_min_deg"), (-20.0, -0.01, "was in the ground")]
+)
+def test_a_gait_that_no_robot_may_walk_or_that_meets_no_ground_is_refused_in_words(
+    tmp_path: Path, swept_deg: float, depth_m: float, wrong: str
+) -> None:
+    back, swing = (f"way_points = [{{ sweep_deg = {at}, depth_m = {depth_m} }}]\n" for at in (swept_deg, 20.0))
+    phases = f'[[phase]]\nname = "stance"\nspeed_m_s = 0.3\n{back}[[phase]]\nname = "swing"\nduration_s = 0.5\n{swing}'
+    (tmp_path / "own.toml").write_text(phases)
+    trials = Trials(tmp_path, {}, lambda done, total: None)
+    with pytest.raises((ConfigurationError, OptionError), match=wrong):
+        study(trials, gait=(f"{tmp_path}/own.toml",), ground=("clay-1.4",), strides=3, seeds=1)
 
 
 def test_estimates_that_are_not_valid_count(monkeypatch: pytest.MonkeyPatch) -> None:
