@@ -77,11 +77,12 @@ def walk(
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> Answer:
-    """Walk at `depth`, or adapt to the mud without one; `adaptive` is there to be typed.
+    """Walk at `depth`, or adapt to the mud without one.
 
     Depths in turn, such as `--depth 2 --depth 3.5 --depth 5`, measure how the coefficients change with depth.
 
-    A gait of a file has its own depths, unless `depth` is given. 'mudskipper gait check FILE' needs no robot.
+    A gait of a file has its own depths, unless `depth` or `adaptive` is given. 'mudskipper gait check FILE' needs no
+    robot.
 
     A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults, and `--mud ""` or
     another empty text leaves one out.
@@ -95,7 +96,10 @@ def walk(
     if gait:
         from firmware_host.configuration.gait_file import as_json, gait_document  # slow to import
 
-        params["gait"] = as_json(gait_document(gait))
+        document = gait_document(gait)
+        if adaptive:
+            document.pop("depths_m", None)
+        params["gait"] = as_json(document)
     if depth:
         depths_m = [each / 100.0 for each in depth]
         params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}

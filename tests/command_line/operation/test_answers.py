@@ -61,6 +61,14 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(confirmation, "time", Clock())
 
 
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_an_adaptive_walk_leaves_out_the_depths_of_its_gait(adaptive: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    ordered: list[Report] = []
+    monkeypatch.setattr(operation, "_change_mode", lambda *order: ordered.append(loads(order[-1]["gait"])))
+    operation.walk(socket=Path(), gait="three_depths", adaptive=adaptive)
+    assert ("depths_m" in ordered[0]) is not adaptive
+
+
 @pytest.mark.parametrize("command", ["stop", "disarm"])
 @pytest.mark.parametrize("mode", ["idle", "fault"])
 def test_confirmed_idle_drives_are_a_success(command: str, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
