@@ -20,7 +20,7 @@ import numpy as np
 from pandas import DataFrame
 
 from control.faults import FAULT_KINDS, Reaction
-from control.records import COEFFICIENTS, UNKNOWN
+from control.records import COEFFICIENTS, UNKNOWN, Phase
 from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence, readings_of
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.recorded_walk import RecordedWalk
@@ -53,7 +53,7 @@ def headline_of(run: Run) -> Entry:
         "complete": run.log is None or run.log.complete,  # False where the writer was cut off, or still writes
         "trial": trial_of(run.log) if run.log else {},
         "walks": len(run.walks),
-        **travel_of(run.walks),
+        **travel_of(run.walks, in_gait=run.log is None),
         "strides": len(run.strides),
         "outcomes": _count_outcomes(run.strides),
         "muds": [_mud_result(run, str(mud), of_mud) for mud, of_mud in muds],
@@ -67,11 +67,15 @@ def reaction_of(cause: LoggedCause) -> Reaction:
     return max(FAULT_KINDS[name].reaction for name in (cause.name, *cause.consequences))
 
 
-def travel_of(walks: Sequence[RecordedWalk]) -> Entry:
-    """Return distance, time and mean speed of all walks; between two walks the robot may be moved."""
+def travel_of(walks: Sequence[RecordedWalk], in_gait: bool = False) -> Entry:
+    """Return distance, time and mean speed of all walks; between two walks the robot may be moved.
+
+    `in_gait`: a walk is all of its file, in which the robot also rests before its first insertion and at the end.
+    """
     distance_m = duration_s = 0.0
     for walk in walks:
-        known = np.flatnonzero(np.isfinite(walk.body_x_m))
+        begun = np.maximum.accumulate(walk.phase == Phase.INSERTION) & (walk.phase != Phase.REST) if in_gait else True
+        known = np.flatnonzero(np.isfinite(walk.body_x_m) & begun)
         if len(known):
             distance_m += float(walk.body_x_m[known[-1]] - walk.body_x_m[known[0]])
             duration_s += float(walk.time_s[known[-1]] - walk.time_s[known[0]])

@@ -15,6 +15,7 @@ from pandas import DataFrame
 from control.faults import Reaction
 from control.geometry import FlipperGeometry
 from control.modes import Mode
+from control.records import Phase
 from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
 from experiments.pictures.mud_layout import layout_of_lengths
@@ -28,6 +29,7 @@ from experiments.run_report.results import (
     reaction_of,
     run_labels,
     speed_of,
+    travel_of,
 )
 from experiments.run_report.run import Run, _placed, _trials_in, read_runs
 from firmware_host.configuration.configuration import Configuration
@@ -175,6 +177,14 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
 
 
+def test_the_rest_before_and_after_the_gait_of_a_csv_is_no_walking() -> None:
+    phase = [Phase.PAUSE, Phase.REST, Phase.REST, Phase.INSERTION, Phase.STANCE, Phase.SWING, Phase.REST, Phase.REST]
+    body_m = np.array([0.0, 0.0, 0.0, 0.0, 0.05, 0.06, 0.06, 0.06])
+    walk: Any = SimpleNamespace(phase=np.array(phase), time_s=np.arange(8.0), body_x_m=body_m)
+    assert [travel_of([walk], in_gait)["duration_s"] for in_gait in (True, False)] == [2.0, 7.0]
+    assert travel_of([walk], in_gait=True)["speed_m_s"] == pytest.approx(0.03)
+
+
 def test_several_muds_need_the_reach_of_the_plates_which_a_csv_without_settings_does_not_have() -> None:
     walk: Any = SimpleNamespace(body_x_m=np.array([0.1]), reach_m=nan)
     two, one = ([("A", 0.6), ("B", 0.6)], [("A", 0.6)])
@@ -243,6 +253,7 @@ def test_strides_in_their_last_hole_do_not_contradict_the_depth_law_of_mud(step_
         known = {"index": index, "depth_m": depth_m, "repeatability": 0.05e6}
         made.append((own | {"index": index}, [each | known for each in estimates]))
     run = run_of(made)
-    walk: Any = SimpleNamespace(geometry=FlipperGeometry(), body_x_m=np.array([]), time_s=np.array([]))
+    empty = dict.fromkeys(("body_x_m", "time_s", "phase"), np.array([]))
+    walk: Any = SimpleNamespace(geometry=FlipperGeometry(), **empty)
     (mud,) = headline_of(replace(run, walks=[walk]))["muds"]
     assert len([text for text in mud["findings"] if text.startswith("k_p")]) == findings
