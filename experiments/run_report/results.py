@@ -242,8 +242,8 @@ def _between(first: Run, before: Entry, other: Run, after: Entry) -> Iterator[En
 
 
 def _is_like(one_m: float, other_m: float) -> bool:
-    """Return whether two depths are so close that the coefficients of a depth law would hardly differ."""
-    return max(one_m, other_m) < NARROWEST * min(one_m, other_m)
+    """Return whether two depths are so close that coefficients hardly differ by a depth law; an unknown one is not."""
+    return one_m < NARROWEST * other_m and other_m < NARROWEST * one_m
 
 
 def _quantities(before: Entry, after: Entry, same_robot: bool) -> Iterator[tuple[str, Value, Value]]:

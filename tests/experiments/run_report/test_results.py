@@ -193,7 +193,7 @@ def test_several_muds_need_the_reach_of_the_plates_which_a_csv_without_settings_
     assert _placed(Path("walk.csv"), layout_of_lengths(one), [walk]) is not None
 
 
-@pytest.mark.parametrize(("depths_m", "alike"), [([0.031, 0.034], True), ([0.02, 0.03, 0.042], False)])
+@pytest.mark.parametrize(("depths_m", "alike"), [([0.031, 0.034], True), ([0.02, 0.03, 0.042], False), ([nan], False)])
 def test_runs_are_of_like_depths_where_both_ends_are_alike(depths_m: list[float], alike: bool) -> None:
     """The means of 2 to 4.2 cm and of 3 cm are no means of one depth, though one range contains the other."""
     other = run_with([1.0e6] * len(depths_m), "b")
