@@ -2,7 +2,7 @@
 
 mudskipper run examples/laws/bandit.py --strides 60
 
-The reward of a stride is the step of the body, as the robot itself estimates it.
+The reward of a stride is the step of the body. It needs a pose: without one the law stays at the first depth.
 """
 
 from math import inf, isfinite, log, sqrt
