@@ -32,6 +32,7 @@ class Client:
         self._client = StatusClient(Path(socket or default_socket()))
         self._lease = {"lease_s": lease_s} if lease_s else {}
         self._leased = False
+        self._has_torque = False  # after an order of this client that moves it
 
     def __enter__(self) -> Client:
         return self
@@ -108,7 +109,7 @@ class Client:
 
     def _move(self, method: str, **params: Any) -> None:
         self._client.call(method, **params, **self._lease)
-        self._leased = bool(self._lease)
+        self._leased, self._has_torque = bool(self._lease), method != "arm"
 
     def stop(self) -> None:
         """End the walk with raised flippers; no lease is needed."""
@@ -137,7 +138,7 @@ class Client:
 
         Raises TimeoutError, and at once a RuntimeError with the cause where a fault or a disarm took the torque away.
         """
-        deadline_s, had_torque = time.monotonic() + timeout_s, False
+        deadline_s, had_torque, self._has_torque = time.monotonic() + timeout_s, self._has_torque, False
         while (report := self.status())["mode"] != mode:
             if problem := _why_without_torque(report, had_torque) if mode not in RESTING else "":
                 raise RuntimeError(problem)
@@ -146,6 +147,7 @@ class Client:
                 raise TimeoutError(f"the robot is in mode {report['mode']} after {timeout_s:g} s, not in {mode}")
             self.renew()
             time.sleep(POLL_S)
+        self._has_torque = mode == "walking"
         return report
 
 

@@ -57,6 +57,17 @@ def test_a_wait_for_the_hold_ends_at_once_where_another_program_disarms(
         robot.wait_for("hold")
 
 
+def test_a_wait_after_a_walk_sees_that_the_torque_is_off_already(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    with mudskipper.Client(bench.socket) as robot:
+        idle = {"mode": "idle", "fault": None, "notice": ""}
+        monkeypatch.setattr(robot._client, "call", lambda method, **params: idle)
+        robot.walk()
+        with pytest.raises(RuntimeError, match="switched off"):
+            robot.wait_for("hold")
+        with pytest.raises(TimeoutError):  # an operator may arm it again
+            robot.wait_for("hold", timeout_s=0.0)
+
+
 def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUDSKIPPER_SOCKET", str(bench.socket))
     with mudskipper.Client() as robot:
