@@ -23,6 +23,7 @@ from control.faults import FAULT_KINDS, Reaction
 from control.records import COEFFICIENTS, UNKNOWN, Phase
 from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence, readings_of
 from estimation.strokes.origin_fit import student_factor
+from experiments.pictures.mud_layout import UNMEASURED
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
@@ -220,7 +221,7 @@ def differences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[Entry]:
         for run, headline in list(zip(runs, headlines, strict=True))[1:]
         for before in headlines[0]["muds"]
         for after in headline["muds"]
-        if mud_key(before["mud"]) == mud_key(after["mud"])
+        if mud_key(before["mud"]) == mud_key(after["mud"]) and not before["mud"].startswith(UNMEASURED)
         for each in _between(runs[0], before, run, after)
     ]
 
