@@ -7,6 +7,7 @@ of 49.5 % water is expected. The acceleration of body and arms is not in it: it 
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import ceil, cos, degrees, floor, hypot, sin
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_path import GaitPath, GaitPhase
 from control.plate_integrals import stance_moment_m4, stroke_moment_m4, submerged_plate
-from control.records import Phase
+from control.records import Phase, Rig
 from firmware_host.configuration.configuration import Configuration
 
 POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
@@ -96,6 +97,8 @@ def _stride_problems(path: GaitPath, configuration: Configuration, depth_m: floa
     if not any(row.phase is Phase.SWING for row in rows):
         yield f"{_phase_key(path, -1)}.duration_s is missing: a swing that stays where it is has no path to end it"
     yield from _depth_problems(path, rows)
+    if path.right_offset_fraction:  # the flippers push in turn, each as a robot's only one
+        configuration = replace(configuration, rig=Rig(configuration.rig.flippers[:1]))
     for row in rows:
         found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration, mud))
         if problem := next(found, ""):

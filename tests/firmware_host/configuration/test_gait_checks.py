@@ -130,6 +130,12 @@ def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuratio
     assert " A " in known
 
 
+def test_flippers_that_push_in_turn_each_move_the_whole_body(configuration: Configuration) -> None:
+    weak, quick = replace(configuration, limits=replace(configuration.limits, torque_nm=0.68)), stroke(speed_m_s=0.8)
+    assert not problems(quick, weak)
+    assert "of the sweep motor" in problems(quick, weak, right_offset_fraction=0.5)[0]
+
+
 def test_conditions_belong_to_flippers_that_move_together(configuration: Configuration) -> None:
     phases = stroke(0, until_force_n=2.0)
     assert not problems(phases, configuration)
