@@ -125,7 +125,7 @@ def _answer_of(law: Law, seen: Any) -> Any:
         raise LawError(f"the law raised {type(problem).__name__}{''.join(own[-1:])}: {problem}") from problem
     took_s = time.monotonic() - begun_s
     if took_s > LEASE_S:
-        complain(f"the law took {took_s:.1f} s: after {LEASE_S:g} s it loses the lease")
+        complain(f"the law took {took_s:.1f} s: a lease lasts {LEASE_S:g} s")
     return answer
 
 

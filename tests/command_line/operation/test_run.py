@@ -149,7 +149,7 @@ def test_a_law_that_takes_longer_than_its_lease_is_named(
 ) -> None:
     monkeypatch.setattr(run, "LEASE_S", 0.01)
     run.run(law(tmp_path, "import time; time.sleep(0.02)"), socket=tmp_path)
-    assert capsys.readouterr().err.count(" s: after 0.01 s it loses the lease") == 2  # strides
+    assert capsys.readouterr().err.count(" s: a lease lasts 0.01 s") == 2  # strides
 
 
 def test_an_order_that_the_daemon_refuses_stops_the_robot(
