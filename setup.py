@@ -1,9 +1,9 @@
 """Compiles the modules of a tick and of the simulator's step with mypyc where MUDSKIPPER_COMPILED=1 asks for it.
 
-`tool.mudskipper.compiled` in pyproject.toml lists these modules; all other metadata is there too. Both forms give the
-same digits, so the C compiler must not fuse a product and a sum into one operation with one rounding, as it otherwise
-does on ARM. Each compiled build uses a folder of its own: an extension that an earlier build left would be imported in
-place of the source.
+`tool.mudskipper.compiled` in pyproject.toml has the patterns of their paths; all other metadata is there too. Both
+forms give the same digits, so the C compiler must not fuse a product and a sum into one operation with one rounding, as
+it otherwise does on ARM. Each compiled build uses a folder of its own: an extension that an earlier build left would be
+imported in place of the source.
 """
 
 import os
@@ -21,10 +21,14 @@ COMPILER = "mypy>=1.14,<3"  # mypyc comes with it
 OPTIONS = ["-ffp-contract=off", "-Wno-error", "-g0"]
 
 
-def compiled_modules() -> list[str]:
-    project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))
-    modules: list[str] = project["tool"]["mudskipper"]["compiled"]
-    return modules
+def compiled_modules(root: Path) -> list[str]:
+    """Return the modules of the patterns, but for those whose fields have bounds, which a compiled class would lose."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    paths = {path for pattern in project["tool"]["mudskipper"]["compiled"] for path in root.glob(pattern)}
+    modules = (path for path in paths if path.name != "__init__.py")
+    return sorted(
+        str(path.relative_to(root)) for path in modules if "Annotated[" not in path.read_text(encoding="utf-8")
+    )
 
 
 def make_extensions(folder: str) -> list[Extension]:
@@ -32,7 +36,7 @@ def make_extensions(folder: str) -> list[Extension]:
     from mypyc.build import mypycify  # only here, since no other installation needs it
 
     options = ["--config-file=", "--ignore-missing-imports"]  # types of packages that the build does not have
-    paths = [*options, *compiled_modules()]
+    paths = [*options, *compiled_modules(Path())]
     extensions: list[Extension] = mypycify(paths, opt_level="2", group_name="mudskipper", target_dir=folder)
     for extension in extensions:
         extension.extra_compile_args += OPTIONS
@@ -59,11 +63,16 @@ def require_compiler() -> None:
         raise SystemExit(f"{VARIABLE}=1: there is no {header}; 'apt install python3-dev', or leave {VARIABLE} out")
 
 
-if not is_asked_for():
-    setup()
-elif "bdist_wheel" in sys.argv:
-    require_compiler()
-    with TemporaryDirectory() as base:
-        setup(ext_modules=make_extensions(f"{base}/sources"), options={"build": {"build_base": base}})
-else:  # pip asks for the metadata, and by egg_info for what the build needs
-    setup(setup_requires=[COMPILER] if "egg_info" in sys.argv else [])
+def build() -> None:
+    if not is_asked_for():
+        setup()
+    elif "bdist_wheel" in sys.argv:
+        require_compiler()
+        with TemporaryDirectory() as base:
+            setup(ext_modules=make_extensions(f"{base}/sources"), options={"build": {"build_base": base}})
+    else:  # pip asks for the metadata, and by egg_info for what the build needs
+        setup(setup_requires=[COMPILER] if "egg_info" in sys.argv else [])
+
+
+if __name__ == "__main__":
+    build()
