@@ -10,7 +10,7 @@ from drivers.can.frames import Frame
 from simulation.devices.simulated_drive import SimulatedDrive
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)  # two programs that are alike are two
 class ForeignMaster:
     drive: SimulatedDrive
     torque_nm: float  # of the joint

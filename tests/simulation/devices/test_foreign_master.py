@@ -51,3 +51,10 @@ def test_its_frames_are_on_the_bus_where_it_uses_the_bus(robot: Lockstep, heard:
     torques_nm, frames = heard_frames(robot, master, 6)
     assert any(torque_nm == pytest.approx(TORQUE_NM) for torque_nm in torques_nm)
     assert len(frames) == (3 if heard else 0)
+
+
+def test_of_two_masters_that_are_alike_each_ends_by_itself(robot: Lockstep) -> None:
+    masters = [ForeignMaster(robot.robot.drives[0], TORQUE_NM) for _ in range(2)]
+    first, second = masters
+    masters.remove(second)
+    assert masters[0] is first
