@@ -41,7 +41,7 @@ ACTION = {  # its range by name; -1 and 1 of an action are the ends
     "sweep_angle_deg": (15.0, 35.0),
     "stance_speed_m_s": (0.2, 0.8),
 }
-OBSERVATION = (  # means of both flippers; 0 where nothing is known, and an error of 1
+OBSERVATION = (  # means of what is known of the flippers; 0 where nothing is, and an error of 1
     "k_p (N/cm³)", "k_s (N/cm³)", "k_e (N/cm³)", "error of k_p", "error of k_s", "error of k_e", "insertion force (N)",
     "stance force (N)", "extraction force (N)", "depth (cm)", "step (cm)", "stuck",
 )  # fmt: skip
@@ -56,6 +56,7 @@ TORQUE_ERROR = 0.03  # the standard deviation of a robot's torque constants
 PATCHES, DURATION_S = 6, 60.0
 FIRST_DEPTH_M = 0.02
 CM_PER_M, PER_JOULE, STUCK, FAULT = 100.0, 0.1, 5.0, 20.0
+SCALES = [1.0] * 9 + [CM_PER_M] * 2 + [1.0]  # from the reports to OBSERVATION
 NOTHING_FELT = [0.0] * 3 + [1.0] * 3 + [0.0] * 6  # no stride has closed yet
 LARGEST = 1000.0  # of any observation
 Array = NDArray[np.float32]
@@ -189,13 +190,13 @@ def _observation(stride: Stride) -> Array:
     flippers = []
     for each in stride.reports:
         known = [each[name] if each[name]["valid"] and each[name]["value"] else None for name in COEFFICIENTS]
-        felt = [1e-6 * k["value"] if k else 0.0 for k in known]
-        felt += [k["std_error"] / k["value"] if k else 1.0 for k in known]
-        felt += [each[f"{phase}_force_n"] or 0.0 for phase in ("insertion", "stance", "extraction")]
-        felt += [CM_PER_M * (each["depth_m"] or 0.0), CM_PER_M * (each["step_m"] or 0.0), float(not each["released"])]
-        flippers.append(felt)
-    means: Array = np.clip(np.mean(flippers or [NOTHING_FELT], axis=0), -LARGEST, LARGEST).astype(np.float32)
-    return means
+        felt = [1e-6 * k["value"] if k else None for k in known]
+        felt += [k["std_error"] / k["value"] if k else None for k in known]
+        felt += [each[f"{phase}_force_n"] for phase in ("insertion", "stance", "extraction")]
+        flippers.append([*felt, each["depth_m"], each["step_m"], not each["released"]])
+    means = np.ma.masked_invalid(np.array(flippers or [NOTHING_FELT], float)).mean(axis=0)
+    observed: Array = np.clip(means.filled(NOTHING_FELT) * SCALES, -LARGEST, LARGEST).astype(np.float32)
+    return observed
 
 
 gymnasium.register("mudskipper/MudWalk-v0", entry_point="mudskipper.gym:MudWalk")

@@ -78,6 +78,15 @@ def test_a_walk_that_ends_before_its_first_stride_is_observed_as_unknown() -> No
     assert felt.tolist() == [0.0] * 3 + [1.0] * 3 + [0.0] * 6 and MudWalk().observation_space.contains(felt)
 
 
+def test_a_flipper_that_knows_nothing_is_left_out_of_the_means() -> None:
+    known, unknown = ({"valid": valid, "value": 2e5, "std_error": 2e4} for valid in (True, False))
+    forces = dict.fromkeys(("insertion_force_n", "stance_force_n", "extraction_force_n"), 2.0)
+    report = {"k_p": known, "k_s": unknown, "k_e": unknown, "depth_m": 0.03, "step_m": 0.0, "released": True} | forces
+    other = report | {"k_p": unknown, "depth_m": None, "stance_force_n": None, "released": False}
+    felt = _observation(Stride([report, other], 0.0, 1.0, 0.0, "", 0.0))
+    assert felt.tolist() == pytest.approx([0.2, 0.0, 0.0, 0.1, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 0.0, 0.5])
+
+
 def test_a_world_is_a_file_its_tables_or_a_ground(tmp_path: Path) -> None:
     path = tmp_path / "world.toml"
     path.write_text("[[segment]]\nstart_m = 0.0\nend_m = 10.0\nstrength_pa = 900.0\n", encoding="utf-8")
