@@ -81,8 +81,7 @@ def walk(
 
     Depths in turn, such as `--depth 2 --depth 3.5 --depth 5`, measure how the coefficients change with depth.
 
-    A gait of a file has its own depths, unless `depth` or `adaptive` is given. 'mudskipper gait check FILE' needs no
-    robot.
+    Without `depth` or `adaptive` a gait of a file has its own depths. 'mudskipper gait check FILE' needs no robot.
 
     A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults, and `--mud ""` or
     another empty text leaves one out.
@@ -101,8 +100,7 @@ def walk(
             document.pop("depths_m", None)
         params["gait"] = as_json(document)
     if depth:
-        depths_m = [each / 100.0 for each in depth]
-        params |= {"depths_m": depths_m} if len(depths_m) > 1 else {"depth_m": depths_m[0]}
+        params |= {"depths_m": [each / 100.0 for each in depth]} if len(depth) > 1 else {"depth_m": depth[0] / 100.0}
     if attended:
         with StatusClient(socket) as client:
             return attend(client, json, params)
