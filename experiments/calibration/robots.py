@@ -33,7 +33,7 @@ from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
 from simulation.harness.local_setup import named_folder
-from simulation.harness.peer import end_with_parent
+from simulation.harness.parent_process import end_with_parent
 
 STARTING_S, ENDING_S, POLL_S = 30.0, 20.0, 0.1
 FILE = "mudskipper.toml"  # of the daemon that holds the weights

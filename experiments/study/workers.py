@@ -10,11 +10,11 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
-from multiprocessing import active_children, parent_process
-from threading import Thread
+from multiprocessing import active_children
 from typing import Any, TypeVar
 
 from experiments.study.session import Show
+from simulation.harness.parent_process import end_with_parent
 
 POLL_S = 0.5
 MOST_LOSSES = 3  # of workers in a row, without a trial that ends
@@ -78,15 +78,7 @@ def _run_in_pool(
 
 def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End a worker whose parent was killed: it would wait for its next trial for ever."""
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    end_with_parent()  # one whose program was killed would wait for its next trial for ever
 
 
 def run_parallel(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.peer import end_with_parent
+from simulation.harness.parent_process import end_with_parent
 
 START_TIMEOUT_S = 60.0  # of a slow or busy computer
 END_TIMEOUT_S = 15.0  # of one process, which is killed then

@@ -6,7 +6,6 @@ moves the flippers back by hand from their mechanical stops, beyond the limits: 
 `mudskipper simulate --reset` sends it, and with `--emergency-stop` SIGUSR2, which cuts the drives' power.
 """
 
-import ctypes
 import os
 import signal
 import sys
@@ -32,7 +31,6 @@ WATCHDOG_S = 0.25  # of the simulated drives, on processors that all processes s
 LONGEST_CATCH_UP_S = 0.02  # a robot that was delayed for longer skips that time: its commands waited meanwhile
 PRIORITY = 1  # of real time
 NICENESS = -10
-PR_SET_PDEATHSIG = 1
 
 
 class Peer:
@@ -77,11 +75,6 @@ class Peer:
 def track_of(waters: Sequence[str]) -> Track:
     """Return compartments of the named water contents, one after the other."""
     return Track([(COMPARTMENT_M, MUDS[water]) for water in waters])
-
-
-def end_with_parent() -> None:
-    """Ask the kernel for SIGTERM when the starting process dies, so that no robot is left over."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 class Ground(NamedTuple):
