@@ -303,8 +303,8 @@ class FaultKind(StrEnum):
     )
     JOINT_OSCILLATING = (
         "joint_oscillating", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 120,
-        "A joint keeps moving away from its commanded path.",
-        "The {subject} joint moved away from its commanded path by {away_rad:.2f} rad in all within 0.3 s.",
+        "A joint keeps moving away from its commanded path, or shakes about it.",
+        "The {subject} joint swings about its commanded path: by {away_rad:.2f} rad away from it in all within 0.3 s.",
         f"lower the stiffness in [gains], or {DISOBEYS}",
     )
     FOLLOWING_ERROR = (

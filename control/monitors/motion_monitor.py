@@ -16,6 +16,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  target, out of the mud or thrown by a stone, and comes to rest, moves as far in a few cycles. Each of
                  its excursions is clearly smaller than the one before on the other side, and does not count. One that
                  is smaller than the one before on its own side ends the count: only its own path remains.
+                 A joint that a strong motor shakes where it rests swings faster than its inertia and its stiffness
+                 allow, π √(I / k) from one side to the other, and moves little: there strong torques in turn count.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -39,7 +41,7 @@ obeys. Oscillation and following therefore count only where samples and ticks we
 such a gap is a fault of its own (`drive_quiet`, `loop_lagging`); a simulation in real time continues.
 """
 
-from math import copysign
+from math import copysign, inf, pi, sqrt
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
@@ -52,6 +54,9 @@ RUNAWAY_FLOOR_J = 0.02  # noise of the speed, and a hand, where the torque limit
 AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
 STABLE_FRACTION = 0.85  # of the excursion before, which fades: a loop with 0.09 of critical damping keeps 0.75 in 40 ms
+FAST_SWING_FRACTION = 0.75  # of half a swing of a sound joint: its motor is at least 1.8 times as strong
+SHAKEN = 6  # torques in a row, each in another direction than the one before
+SHAKING_FRACTION = 1.0 / 3.0  # of the torque limit, and at least PRESSING_NM
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
@@ -93,7 +98,10 @@ class MotionMonitor:
         self._runaway_j = runaway_bound_j(torque_nm)
         self._near_limit_nm = NEAR_LIMIT_FRACTION * torque_nm
         stiffness_nm_rad = dynamics.stiffness_nm_rad
-        self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else float("inf"))
+        self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else inf)
+        half_swing_s = pi * sqrt(dynamics.inertia_kg_m2 / stiffness_nm_rad) if stiffness_nm_rad else 0.0
+        self._shaken_s = FAST_SWING_FRACTION * half_swing_s  # largest, between two torques
+        self._shaking_nm = max(SHAKING_FRACTION * torque_nm, PRESSING_NM)
         self.reset()
 
     def reset(self) -> None:
@@ -104,6 +112,7 @@ class MotionMonitor:
         self._excursion_rad = self._excursion_before_rad = self._same_side_rad = 0.0
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
+        self._shaken, self._turned_nm, self._turned_s = 0, 0.0, NEVER_S  # torques in turn; the last one and its time
         self.driven_back = 0  # intervals in a row
         self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
         self._back_rad_s = 0.0  # in the interval before
@@ -145,7 +154,7 @@ class MotionMonitor:
         self._target_rad, self._error_rad = target_rad, target_rad - angle_rad
         following = not abs(self._error_rad) > self._following_rad  # also without a target
         explained = self.unexplained_j <= self._runaway_j and self.driven_back < NOT_YIELDED
-        if not following or not explained or self.away_rad > AWAY_RAD:
+        if not following or not explained or self.away_rad > AWAY_RAD or self._shaken >= SHAKEN:
             self._report(found, target)
 
     def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float, braked: bool) -> None:
@@ -161,6 +170,11 @@ class MotionMonitor:
             self._watch_rocking(elapsed_s, step_rad, torque_nm, reverses)
         else:
             self._rock_s = UNKNOWN
+        resting = braked or target_step_rad == 0.0
+        if torque_nm * self._turned_nm <= 0.0 and abs(torque_nm) >= self._shaking_nm:
+            shakes = resting and self._stamp_s - self._turned_s < self._shaken_s
+            self._shaken = self._shaken + 1 if shakes else 1
+            self._turned_nm, self._turned_s = torque_nm, self._stamp_s
         weak = -PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED
         if braked or reverses or weak or self._rock_s < DRIVEN_BACK_S:
             self._pressed_s = self._back_rad = 0.0
@@ -168,7 +182,7 @@ class MotionMonitor:
         else:
             self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
         work_j = torque_nm * step_rad
-        leak_s = RESTING_LEAK_S if braked or target_step_rad == 0.0 else RUNAWAY_LEAK_S
+        leak_s = RESTING_LEAK_S if resting else RUNAWAY_LEAK_S
         unexplained_j = (1.0 - elapsed_s / leak_s) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
         if self._punctual_s < SETTLING_S:
@@ -233,7 +247,8 @@ class MotionMonitor:
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
         if self.driven_back >= NOT_YIELDED:
             found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
-        if self.away_rad > AWAY_RAD and self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad:
+        away = self.away_rad > AWAY_RAD and self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad
+        if away or self._shaken >= SHAKEN:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:
             return

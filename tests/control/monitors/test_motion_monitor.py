@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from math import copysign, cos, inf, nan, nextafter, pi, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -151,9 +151,39 @@ def test_a_joint_that_shakes_against_its_torques_is_found_by_what_it_gains_where
         now_s = tick * PERIOD_S
         target_rad, speed_rad_s = target_rad_s * now_s, 2.0 * cos(pulse * now_s)
         angle_rad = target_rad + 2.0 / pulse * sin(pulse * now_s)
-        braking_nm = -0.25 * 2.0 * cos(pulse * (now_s - PERIOD_S / 2.0))  # half a watt
+        braking_nm = -0.24 * cos(pulse * (now_s - PERIOD_S / 2.0))  # a quarter of a watt
         samples.add(angle_rad, speed_rad_s, target_rad, PERIOD_S, braking_nm, target_rad_s)
     assert samples.names == found
+
+
+@pytest.mark.parametrize(
+    ("limit_nm", "torque_nm", "dt_s", "resting", "shaken_at"),
+    [
+        (0.75, 0.25, 0.0166, {"target_rad": 0.0}, 6),
+        (0.75, 0.25, 0.0166, {"braked": True}, 6),
+        (0.3, 0.249, 0.0166, {"target_rad": 0.0}, None),  # as much as dry friction
+        (3.0, 0.99, 0.0166, {"target_rad": 0.0}, None),  # noise of a large robot
+        (0.75, 0.25, 0.0167, {"target_rad": 0.0}, None),  # 0.75 π √(0.0004 kg·m² / 8 N·m/rad) = 16.66 ms
+        (0.75, 0.25, 0.0166, {}, None),  # rocked in a recovery
+    ],
+)
+def test_strong_torques_in_turn_that_are_faster_than_a_sound_joint_swings_are_found_at_the_sixth(
+    limit_nm: float, torque_nm: float, dt_s: float, resting: dict[str, Any], shaken_at: int | None
+) -> None:
+    samples = Samples(limit_nm)
+    samples.add(**resting)
+    found = [samples.add(torque_nm=copysign(torque_nm, (-1) ** turn), dt_s=dt_s, **resting) for turn in range(12)]
+    assert [turn for turn, names in enumerate(found, 1) if names] == list(range(shaken_at or 13, 13))
+    assert samples.names <= {"joint_oscillating"}
+
+
+def test_a_target_that_moves_or_a_torque_that_lasts_ends_the_count_of_those_in_turn() -> None:
+    samples = Samples()
+    for turn in range(24):
+        target_rad = 0.001 * (turn // 5)
+        assert samples.add(torque_nm=0.3 * (-1) ** turn, dt_s=0.01, target_rad=target_rad) == set()
+    for turn in range(24):
+        assert samples.add(torque_nm=0.3 * (-1) ** (turn // 2), dt_s=0.0125, target_rad=0.0) == set()
 
 
 def test_a_pose_held_with_commands_that_come_late_is_found() -> None:
