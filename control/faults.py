@@ -371,12 +371,12 @@ class FaultKind(StrEnum):
         "A motor is too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL,
     )
     WINDING_OVERHEATING = (
-        "winding_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 3,
+        "winding_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 11,
         "A winding is nearly too hot, estimated from its currents.",
         "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.", COOL,
     )
     WINDING_HOT = (
-        "winding_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 3,
+        "winding_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 11,
         "A winding is too hot, estimated from its currents.",
         "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.", COOL,
     )

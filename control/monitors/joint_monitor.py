@@ -22,6 +22,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
 MOST_SEEN_S = 0.03  # largest time that one tick adds to a duration: the joint was not observed during a longer gap
 MISSING_HEARTBEATS = 5  # in a row
 SLOW_SILENCE_S = 1.0  # of temperature and bus voltage, once they were reported
+HEAT_S = 0.02  # between two checks of the heat
 ENERGISED_S = 0.2  # two heartbeats, within which a drive may still report closed loop after a command to idle
 FAST_FRACTION = 1.25  # of the velocity limit, above which the limits allow no driving torque
 CURRENT_FRACTION = 1.25  # of the drive's current limit
@@ -70,6 +71,8 @@ class JointMonitor:
         self.joint = joint
         self._answers_only = answers_only
         self.winding = Winding(winding)
+        self._heat: Fault | None = None  # of the last check
+        self._unchecked_s = HEAT_S  # since then
         self._limits = limits
         self._bounds = bounds
         self._span = span
@@ -90,7 +93,7 @@ class JointMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Clear all durations, but not the winding's temperature."""
+        """Clear all durations, but not the winding's temperature nor its fault."""
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
         self._low_s = self._under_s = self._hot_s = 0.0
@@ -286,9 +289,18 @@ class JointMonitor:
     # heat
 
     def _watch_heat(self, found: list[Fault], facts: TickFacts, state: DriveState, torque_nm: float) -> None:
+        """Add what the last check of the heat found; heat changes slowly, so it is checked every HEAT_S."""
+        self._unchecked_s += facts.dt_s
+        if self._unchecked_s > HEAT_S:
+            self._heat = self._check_heat(facts, state, torque_nm)
+            self._unchecked_s = 0.0
+        if self._heat:
+            found.append(self._heat)
+
+    def _check_heat(self, facts: TickFacts, state: DriveState, torque_nm: float) -> Fault | None:
         measured_c = state.temperature_c
         if measured_c >= self._nearly_hot_c:
-            self._hot_s += min(facts.dt_s, MOST_SEEN_S)
+            self._hot_s += min(self._unchecked_s, MOST_SEEN_S)
             if self._hot_s <= TWO_MESSAGES_S:
                 measured_c = UNKNOWN
         else:
@@ -296,13 +308,13 @@ class JointMonitor:
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # more is no measurement
         if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old current does not heat for ever
             current_a = torque_nm / self._constant_nm_a
-        winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
+        winding_c = self.winding.update(self._unchecked_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
-            return
+            return None
         hot = winding_c >= self._limits.temperature_hot_c
         by_sensor = measured_c >= (self._limits.temperature_hot_c if hot else self._nearly_hot_c)
         if by_sensor:
             kind = FaultKind.MOTOR_HOT if hot else FaultKind.MOTOR_OVERHEATING
         else:
             kind = FaultKind.WINDING_HOT if hot else FaultKind.WINDING_OVERHEATING
-        found.append(self._fault(kind, temperature_c=measured_c if by_sensor else winding_c))
+        return self._fault(kind, temperature_c=measured_c if by_sensor else winding_c)

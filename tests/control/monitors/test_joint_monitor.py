@@ -61,9 +61,9 @@ def pushed(torque_nm: float, **changes: Any) -> Changes:
         ("voltage_under", {"bus_voltage_v": 17.9}, {}, 58),
         ("voltage_low", {"bus_voltage_v": 19.9}, {"dt_s": 0.03}, 6),  # exactly its time is no fault
         ("voltage_under", {"bus_voltage_v": 17.9}, {"dt_s": 0.03}, 6),
-        ("motor_overheating", {"temperature_c": 80.0}, {}, 58),
+        ("motor_overheating", {"temperature_c": 80.0}, {}, 57),  # heat is checked every eighth tick, from the first
         ("motor_overheating", {"temperature_c": 80.0}, {"dt_s": 0.03}, 6),
-        ("motor_hot", {"temperature_c": 90.0}, {}, 58),
+        ("motor_hot", {"temperature_c": 90.0}, {}, 57),
         ("joint_position", {"angle_rad": nextafter(MARGIN_RAD, inf)}, {}, 1),
         ("joint_position", {"angle_rad": nextafter(-MARGIN_RAD, -inf)}, {}, 1),
         ("joint_position", {"angle_rad": nan}, {}, 1),
@@ -165,7 +165,7 @@ def test_torque_is_not_missing_where_the_motor_s_voltage_is_used_up(velocity_rad
         ("joint_velocity", 2, {"velocity_rad_s": 100.0}, {}, {}, {}),
         ("voltage_low", 57, {"bus_voltage_v": 19.9}, {}, {"bus_voltage_v": 20.0}, {}),
         ("voltage_under", 57, {"bus_voltage_v": 17.9}, {}, {"bus_voltage_v": 18.0}, {}),
-        ("motor_overheating", 57, {"temperature_c": 85.0}, {}, {"temperature_c": 79.9}, {}),
+        ("motor_overheating", 5, {"temperature_c": 85.0}, {"dt_s": 0.03}, {"temperature_c": 79.9}, {"dt_s": 0.03}),
     ],
 )
 def test_one_good_tick_begins_the_wait_again(
@@ -368,7 +368,7 @@ def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_th
         monitor.winding.temperature_c = winding_c
         faults = faults_of(monitor, healthy(temperature_c=measured_c))
     assert [fault.name for fault in faults] == [name][: bool(name)]
-    assert not faults or dict(faults[0].values)["temperature_c"] == pytest.approx(expected_c, abs=0.01)
+    assert not faults or dict(faults[0].values)["temperature_c"] == pytest.approx(expected_c, abs=0.05)  # which cools
 
 
 def test_one_hot_message_after_a_gap_is_no_fault_and_heats_no_winding() -> None:
@@ -397,7 +397,7 @@ def test_a_reset_forgets_the_angle_and_the_energy_and_does_not_cool_a_winding() 
     monitor.reset()
     assert monitor.motion.unexplained_j == 0.0
     now_s = NOW_S + 20 * PERIOD_S
-    assert names_of(monitor, healthy(now_s, angle_rad=0.6), now_s) == {"winding_hot"}
+    assert names_of(monitor, healthy(now_s, angle_rad=0.6), now_s, dt_s=0.03) == {"winding_hot"}
 
 
 def test_after_a_reset_a_joint_counts_as_still_until_it_moves() -> None:
@@ -421,14 +421,15 @@ drive_states = st.builds(
 def test_no_value_makes_it_fail_and_garbage_is_forgotten_once_the_signals_are_good_again(
     states: list[DriveState], energised: bool, moving: bool, torque_nm: float
 ) -> None:
-    """Only heat and, for one tick, the jump back are left."""
+    """Only heat and, for one tick, the jump back are left; and its energy, where the torque was large."""
     monitor = make_monitor()
     for tick, state in enumerate(states):
         now_s = NOW_S + tick * PERIOD_S
         for fault in faults_of(monitor, state, now_s, torque_nm, energised=energised, moving=moving):
             assert fault.exact_message()
         assert isfinite(monitor.winding.temperature_c)
-    for tick in range(len(states), len(states) + 5):
+    for tick in range(len(states), len(states) + 8):
         now_s = NOW_S + tick * PERIOD_S
         found = names_of(monitor, healthy(now_s), now_s)
-    assert found <= {"winding_hot", "winding_overheating"}
+    energy = set() if abs(torque_nm) < 0.3 else {"joint_runaway"}  # 0.09 J over the largest step that is no jump
+    assert found - energy <= {"winding_hot", "winding_overheating"}
