@@ -3,25 +3,28 @@
 Each problem is one message with file, phase, key, value and bound. The currents are those that the forecast of depths
 expects (control/depth/forecast.py): k_p Φ on the way down, half of k_e Φ, the peak of an extraction, on the way up; and
 backward or forward k_s Ψ, or what moves the body against its drag if that is less. Where no mud is known, the paper's
-of 49.5 % water is expected. The acceleration of body and arms is not in it: it lasts tens of milliseconds.
+of 49.5 % water is expected. A phase ends where its force reaches `until_force_n`, and the stride goes on from there.
+The acceleration of body and arms is not in it: it lasts tens of milliseconds.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import ceil, cos, degrees, floor, hypot, sin
+from math import ceil, cos, degrees, floor, hypot, inf, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
 from control.gait.recovery import OUT_M, is_in_mud
-from control.gait.stride_table import PhaseRow, stride_table
+from control.gait.stride_table import Begun, PhaseRow, stride_table
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_path import GaitPath, GaitPhase
 from control.plate_integrals import stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase, Rig
+from estimation.force_map import smallest_force_n
 from firmware_host.configuration.configuration import Configuration
 
 POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
+FINE_POINTS = 64  # of a row that a force ends
 ROUNDING_M = 1e-9  # of a depth on a path
 PEAK_FRACTION = 0.5  # of k_e Φ
 EXPECTED_N_M3 = {"k_p": 0.82e6, "k_s": 0.46e6, "k_e": 1.45e6}  # 49.5 % water, docs/results/loadcell.json
@@ -52,7 +55,11 @@ def gait_problems(
     path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate = NOTHING_KNOWN
 ) -> Iterator[str]:
     """Yield what is wrong with a gait: first with its keys, else with its deepest stride in this mud."""
-    problems = list(key_problems(path)) or list(_stride_problems(path, configuration, depth_m, mud))
+    problems = (
+        list(key_problems(path))
+        or list(_path_problems(path, configuration, depth_m))
+        or list(_current_problems(path, configuration, depth_m, mud))
+    )
     yield from (f"{path.name or 'gait'}: {problem}" for problem in problems)
 
 
@@ -91,16 +98,14 @@ def _phase_key(path: GaitPath, number: int) -> str:
     return f"phase {number % len(path.phase) + 1} ({path.phase[number].name})"
 
 
-def _stride_problems(path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate) -> Iterator[str]:
+def _path_problems(path: GaitPath, configuration: Configuration, depth_m: float) -> Iterator[str]:
     """Yield the first problem of each row."""
     rows = stride_table(path, configuration.geometry, depth_m)
     if not any(row.phase is Phase.SWING for row in rows):
         yield f"{_phase_key(path, -1)}.duration_s is missing: a swing that stays where it is has no path to end it"
     yield from _depth_problems(path, rows)
-    if path.right_offset_fraction:  # the flippers push in turn, each as a robot's only one
-        configuration = replace(configuration, rig=Rig(configuration.rig.flippers[:1]))
     for row in rows:
-        found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration, mud))
+        found = (problem for pose in _poses(row) for problem in _pose_problems(row, pose, configuration))
         if problem := next(found, ""):
             yield f"{_phase_key(path, row.number)}.{problem}"
 
@@ -114,18 +119,18 @@ def _depth_problems(path: GaitPath, rows: Sequence[PhaseRow]) -> Iterator[str]:
             yield f"{_phase_key(path, number)}.until_depth_m = {phase.until_depth_m:g}: {least}"
 
 
-def _poses(row: PhaseRow) -> Iterator[Pose]:
-    for i in range(POINTS + 1):
-        fraction, rate = smooth_progress(row.duration_s * i / POINTS, row.duration_s)
+def _poses(row: PhaseRow, points: int = POINTS) -> Iterator[Pose]:
+    for i in range(points + 1):
+        fraction, rate = smooth_progress(row.duration_s * i / points, row.duration_s)
         sweep_rad, depth_m, sweep_rate, depth_rate = row.at(fraction)
         yield Pose(sweep_rad, depth_m, sweep_rate * rate, depth_rate * rate)
 
 
-def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud: MudEstimate) -> Iterator[str]:
+def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration) -> Iterator[str]:
     geometry, limits = configuration.geometry, configuration.limits
     sweep_rad, depth_m, swept_rad_s, sunk_m_s = pose
     sweep_deg = degrees(sweep_rad)
-    where = f"way_points: depth {100.0 * depth_m:.2f} cm at a sweep of {sweep_deg:.1f} degrees"
+    where = _where(pose)
     if not limits.sweep_min_deg <= sweep_deg <= limits.sweep_max_deg:
         low_deg, high_deg = limits.sweep_min_deg, limits.sweep_max_deg
         yield f"{where}: must be from {low_deg:g} to {high_deg:g} degrees, limits.sweep_min_deg and sweep_max_deg"
@@ -153,7 +158,10 @@ def _pose_problems(row: PhaseRow, pose: Pose, configuration: Configuration, mud:
     if speed_rad_s > limits.velocity_rad_s:
         fastest = f"limits.velocity_rad_s = {limits.velocity_rad_s:g}"
         yield f"{where}: a joint turns at {speed_rad_s:.1f} rad/s, must be at most {fastest}"
-    yield from (f"{where}: {problem}" for problem in _current_problems(pose, lift_rad, configuration, mud))
+
+
+def _where(pose: Pose) -> str:
+    return f"way_points: depth {100.0 * pose.depth_m:.2f} cm at a sweep of {degrees(pose.sweep_rad):.1f} degrees"
 
 
 def _innermost_m(geometry: FlipperGeometry, sweep_rad: float, lift_rad: float) -> float:
@@ -165,17 +173,38 @@ def _innermost_m(geometry: FlipperGeometry, sweep_rad: float, lift_rad: float) -
     )
 
 
-def _current_problems(pose: Pose, lift_rad: float, configuration: Configuration, mud: MudEstimate) -> Iterator[str]:
-    """Compare the currents against mud that yields with those that the drives may have."""
+def _current_problems(path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate) -> Iterator[str]:
+    """Yield the phases in which mud that yields takes more current than the drives may have, with its first pose."""
     constants_nm_a = configuration.torque_constants_nm_a[:2]
     largest_nm = configuration.limits.torque_nm  # which every drive can exert: drive_consistency.py
-    torques_nm = expected_torques_nm(pose, lift_rad, configuration, mud)
-    for axis, torque_nm, constant_nm_a in zip(("sweep", "adduction"), torques_nm, constants_nm_a, strict=True):
-        if torque_nm > largest_nm:
-            yield (
-                f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor, must be at most"
-                f" {largest_nm / constant_nm_a:.1f} A ({largest_nm:.2f} N·m); a smaller depth takes less"
-            )
+    if path.right_offset_fraction:  # the flippers push in turn, each as a robot's only one
+        configuration = replace(configuration, rig=Rig(configuration.rig.flippers[:1]))
+    found: dict[int, str] = {}
+    for number, pose, torques_nm in _loaded_poses(path, configuration, depth_m, mud):
+        for axis, torque_nm, constant_nm_a in zip(("sweep", "adduction"), torques_nm, constants_nm_a, strict=True):
+            if torque_nm > largest_nm:
+                taken = f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor"
+                most = f"{largest_nm / constant_nm_a:.1f} A ({largest_nm:.2f} N·m); a smaller depth takes less"
+                found.setdefault(number, f"{_phase_key(path, number)}.{_where(pose)}: {taken}, must be at most {most}")
+    yield from found.values()
+
+
+def _loaded_poses(
+    path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate
+) -> Iterator[tuple[int, Pose, tuple[float, float]]]:
+    """Yield phase, pose and torques along a stride in which this mud ends phases at their `until_force_n`."""
+    geometry, rows = configuration.geometry, stride_table(path, configuration.geometry, depth_m)
+    for number, phase in enumerate(path.phase):
+        points = POINTS if phase.until_force_n is None else FINE_POINTS
+        for pose in [pose for row in rows if row.number == number for pose in _poses(row, points)]:
+            reached_m = min(pose.depth_m, geometry.deepest_m(degrees(pose.sweep_rad)))  # as the gait does
+            angles_rad = pose.sweep_rad, geometry.adduction_rad(pose.sweep_rad, reached_m)
+            torques_nm = expected_torques_nm(pose, angles_rad[1], configuration, mud)
+            if hypot(*smallest_force_n(geometry, *angles_rad, *torques_nm)) >= (phase.until_force_n or inf):
+                depth_m = pose.depth_m if phase.name == "insertion" else depth_m
+                rows = stride_table(path, geometry, depth_m, Begun(number + 1, pose.sweep_rad, pose.depth_m))
+                break
+            yield number, pose, torques_nm
 
 
 def expected_torques_nm(

@@ -130,6 +130,21 @@ def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuratio
     assert " A " in known
 
 
+def test_a_phase_takes_no_more_current_than_the_force_that_ends_it(configuration: Configuration) -> None:
+    """The insertion to 5 cm ends at 2 N in firm mud, where the extraction begins; after 4 N it takes too much."""
+    firm, sticky = (Coefficient(value, 1e5, 1e5, 0.03, -0.3, 0.1, 3) for value in (5e6, 15e6))
+    mud, document = NOTHING_KNOWN._replace(k_p=firm, k_e=sticky), gait_document("slow_insertion")
+    found = []
+    for until_force_n in (2.0, 4.0, None):
+        document["phase"][0]["until_force_n"] = until_force_n
+        found.append(list(gait_problems(read_gait(document), configuration, 0.05, mud)))
+    assert [[re.findall(r"phase \d", each)[0] for each in problems] for problems in found] == [
+        [],
+        ["phase 3"],
+        ["phase 1", "phase 3"],
+    ]
+
+
 def test_flippers_that_push_in_turn_each_move_the_whole_body(configuration: Configuration) -> None:
     weak, quick = replace(configuration, limits=replace(configuration.limits, torque_nm=0.68)), stroke(speed_m_s=0.8)
     assert not problems(quick, weak)
