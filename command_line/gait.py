@@ -50,7 +50,7 @@ def check(
     path = read_gait(gait_document(gait))
     depth_m = max(path.depths_m, default=configuration.adaptation.initial_depth_m)
     depths = [f"{path.name}: {wrong}" for each_m in path.depths_m if (wrong := depth_problem(configuration, each_m))]
-    if problems := [*depths, *gait_problems(path, configuration, depth_m)]:
+    if problems := [*depths, *gait_problems(path, configuration, path.depths_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
     needs_depth = f" at {100.0 * depth_m:g} cm: without depths_m it needs --depth to walk" * (not path.depths_m)

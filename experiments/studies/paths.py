@@ -69,7 +69,7 @@ def study(
     """The coefficients of a ground from paths other than the crutching gait."""
     documents = {name: gait_document(name) for name in gait}
     for document in documents.values():
-        if problems := list(gait_problems(read_gait(document), configuration_of(WALKING), depth / 100.0)):
+        if problems := list(gait_problems(read_gait(document), configuration_of(WALKING), (depth / 100.0,))):
             raise ConfigurationError(problems)  # before anything runs
     walked = {"depth_m": depth / 100.0, "strides": strides}
     rows = [

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
 from control.gait.recovery import OUT_M, is_in_mud
-from control.gait.stride_table import Begun, PhaseRow, stride_table
+from control.gait.stride_table import Begun, PhaseRow, crutching_parameters, stride_table
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_path import GaitPath, GaitPhase
@@ -52,15 +52,29 @@ def depth_problem(configuration: Configuration, depth_m: float) -> str:
 
 
 def gait_problems(
-    path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate = NOTHING_KNOWN
+    path: GaitPath, configuration: Configuration, depths_m: Sequence[float], mud: MudEstimate = NOTHING_KNOWN
 ) -> Iterator[str]:
-    """Yield what is wrong with a gait: first with its keys, else with its deepest stride in this mud."""
-    problems = (
-        list(key_problems(path))
-        or list(_path_problems(path, configuration, depth_m))
-        or list(_current_problems(path, configuration, depth_m, mud))
-    )
+    """Yield what is wrong with a gait: first with its keys, else with its deepest or its shallowest path.
+
+    Else with the currents in this mud, but not without depths, where the gait adapts to it.
+    """
+    problems = list(key_problems(path))
+    if not problems:
+        adaptive_m = () if depths_m else _adaptive_depths_m(path, configuration)
+        walked_m = adaptive_m or depths_m or (configuration.adaptation.initial_depth_m,)
+        for depth_m in sorted({max(walked_m), min(walked_m)}, reverse=True):
+            problems = problems or list(_path_problems(path, configuration, depth_m))
+        if not (problems or adaptive_m):
+            problems = list(_current_problems(path, configuration, max(walked_m), mud))
     yield from (f"{path.name or 'gait'}: {problem}" for problem in problems)
+
+
+def _adaptive_depths_m(path: GaitPath, configuration: Configuration) -> Sequence[float]:
+    """Return the least and the greatest depth that the choice of depth may take; none for a gait that cannot adapt."""
+    adaptation, gait = configuration.adaptation, crutching_parameters(path)
+    if gait is None:
+        return ()
+    return adaptation.min_depth_m, min(adaptation.max_depth_m, configuration.geometry.deepest_m(gait.sweep_angle_deg))
 
 
 def key_problems(path: GaitPath) -> Iterator[str]:

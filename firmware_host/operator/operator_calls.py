@@ -224,8 +224,7 @@ class OperatorCalls:
         if not depths_m and parameters is None:
             raise RefusedError(f"{path.name}: depths_m is missing: only the crutching gait's depth adapts to the mud")
         configuration, mud = self._loop.configuration, self._loop.learning.estimator.mud_estimate
-        deepest_m = max(depths_m, default=configuration.adaptation.initial_depth_m)
-        if problem := next(gait_problems(path, configuration, deepest_m, mud), ""):
+        if problem := next(gait_problems(path, configuration, depths_m, mud), ""):
             raise RefusedError(problem)
         return parameters or path
 

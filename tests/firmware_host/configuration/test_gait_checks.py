@@ -34,13 +34,13 @@ def stroke(number: int = 1, **changes: Any) -> list[dict[str, Any]]:
 
 def problems(phases: list[dict[str, Any]], configuration: Configuration, **keys: Any) -> list[str]:
     path = read_gait({"name": "mine.toml", "phase": phases, **keys})
-    return list(gait_problems(path, configuration, 0.03))
+    return list(gait_problems(path, configuration, [0.03]))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_gaits_that_ship_are_accepted(configuration: Configuration, name: str) -> None:
     path = read_gait(gait_document(name))
-    assert not list(gait_problems(path, configuration, max(path.depths_m, default=0.03)))
+    assert not list(gait_problems(path, configuration, path.depths_m))
 
 
 def test_a_depth_of_less_than_half_a_centimetre_is_refused(configuration: Configuration) -> None:
@@ -125,7 +125,7 @@ def test_joints_of_other_torque_constants_may_have_the_same_torque(configuration
 def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuration: Configuration) -> None:
     firm = Coefficient(8e6, 1e5, 1e5, 0.03, -0.5, 0.1, 3)
     path = read_gait({"name": "mine.toml", "phase": stroke()})
-    (known,) = gait_problems(path, configuration, 0.03, NOTHING_KNOWN._replace(k_e=firm))
+    (known,) = gait_problems(path, configuration, [0.03], NOTHING_KNOWN._replace(k_e=firm))
     assert known.startswith("mine.toml: phase 3 (extraction)")
     assert " A " in known
 
@@ -137,12 +137,31 @@ def test_a_phase_takes_no_more_current_than_the_force_that_ends_it(configuration
     found = []
     for until_force_n in (2.0, 4.0, None):
         document["phase"][0]["until_force_n"] = until_force_n
-        found.append(list(gait_problems(read_gait(document), configuration, 0.05, mud)))
+        found.append(list(gait_problems(read_gait(document), configuration, [0.05], mud)))
     assert [[re.findall(r"phase \d", each)[0] for each in problems] for problems in found] == [
         [],
         ["phase 3"],
         ["phase 1", "phase 3"],
     ]
+
+
+def test_a_gait_that_adapts_is_checked_at_every_depth_but_not_for_currents(configuration: Configuration) -> None:
+    """An extraction at 0.8 m/s is too quick from 4.5 cm on. Firm mud that takes too much at 3 cm adapts the depth."""
+    walking, quick = read_gait(gait_document("walking")), gait_document("walking")
+    quick["phase"][2]["speed_m_s"] = 0.8
+    assert not [*gait_problems(read_gait(quick), configuration, [0.03])]
+    assert "rad/s" in next(gait_problems(read_gait(quick), configuration, []))
+    firm = NOTHING_KNOWN._replace(k_p=Coefficient(5e6, 1e5, 1e5, 0.03, -0.3, 0.1, 3))
+    assert " A " in next(gait_problems(walking, configuration, [0.03], firm))
+    assert not [*gait_problems(walking, configuration, [], firm)]
+
+
+def test_a_path_is_checked_at_its_shallowest_depth_too(configuration: Configuration) -> None:
+    deeper = {"name": "stance", "duration_s": 0.03, "way_points": [point(30.0, 0.045)]}
+    first = {"name": "insertion", "speed_m_s": 0.1, "way_points": [{"sweep_deg": 30.0, "depth_fraction": 1.0}]}
+    path = read_gait({"phase": [first, deeper, *stroke()[2:]]})
+    assert not [*gait_problems(path, configuration, [0.045])]
+    assert "rad/s" in next(gait_problems(path, configuration, [0.045, 0.015]))
 
 
 def test_flippers_that_push_in_turn_each_move_the_whole_body(configuration: Configuration) -> None:
