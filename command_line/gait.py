@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
 from command_line.errors import CommandError
+from command_line.operation.operation import Depths
 from command_line.screen import complain
 from command_line.shared_options import Seed
 from control.gait.stride_table import crutching_parameters, stride_table
@@ -83,6 +84,7 @@ def simulate(
     *,
     config: Robot = None,
     mud: Annotated[str, Option("water content", metavar="W", choices=tuple(MUDS))] = "53.1",
+    depth: Depths = (),
     strides: Annotated[int, Option("number of strides", low=1, high=1000)] = 5,
     seed: Seed = 1,
 ) -> int:
@@ -93,7 +95,8 @@ def simulate(
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
-        calls.methods["walk"]({"gait": as_json(gait_document(gait)), "strides": strides}, CALLER)
+        depths = {"depths_m": [each / 100.0 for each in depth]} if depth else {}
+        calls.methods["walk"]({"gait": as_json(gait_document(gait)), "strides": strides, **depths}, CALLER)
     except RefusedError as problem:
         raise ConfigurationError([str(problem)]) from None
     except RuntimeError as problem:

@@ -102,3 +102,5 @@ def test_a_path_without_depths_is_accepted_for_a_walk_that_gives_one(tmp_path: P
     checked, walked = run("gait", "check", str(path)), run("gait", "simulate", str(path))
     assert checked.returncode == exit_codes.OK and "needs --depth" in checked.stdout
     assert walked.returncode == exit_codes.CONFIGURATION and "depths_m is missing" in walked.stderr
+    simulated = run("gait", "simulate", str(path), "--depth", "2", "--strides", "1")
+    assert simulated.returncode == exit_codes.OK
