@@ -1,7 +1,6 @@
 """One program alone has a role on a bus, until it ends in any way."""
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -19,25 +18,19 @@ input()
 """
 
 
-def hold(channel: str) -> subprocess.Popen[str]:
-    """Return another process that commands a bus."""
-    command = [sys.executable, "-c", HOLD.format(channel)]
-    process = subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None and process.stdout.readline() == "held\n"
-    return process
-
-
 @pytest.fixture
 def channel() -> str:
     return f"test{os.getpid()}"
 
 
 def test_a_second_program_is_refused_and_reads_who_has_the_bus(channel: str) -> None:
-    with hold(channel) as owner:
+    command = [sys.executable, "-c", HOLD.format(channel)]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as owner:
+        assert owner.stdout is not None and owner.stdout.readline() == "held\n"
         for _ in range(10):  # each question stays in the owner's queue
             with pytest.raises(BusTakenError, match=f"process {owner.pid} commands its drives already"):
                 BusLock(BusRole.COMMANDS, "socketcan", channel)
-        owner.send_signal(signal.SIGKILL)
+        owner.kill()
     BusLock(BusRole.COMMANDS, "socketcan", channel).close()  # free once its owner is dead
 
 

@@ -70,8 +70,6 @@ def test_an_interface_that_is_missing_is_the_opening_s_own_problem(tmp_path: Pat
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('interface = "socketcan"', 'interface = "slcan"', "bus.left.interface = 'slcan': carries no CAN FD"),
-        ("data_bit_rate_kbit_s = 5000", "data_bit_rate_kbit_s = 0", "bus.left.data_bit_rate_kbit_s = 0: must be"),
         ("node_id = 2", "node_id = 127", "drive.left_adduction.node_id = 127: must be at most 126"),
         (
             'type = "moteus"',
@@ -80,7 +78,7 @@ def test_an_interface_that_is_missing_is_the_opening_s_own_problem(tmp_path: Pat
         ),
     ],
 )
-def test_a_wrong_configuration_is_refused_by_its_key(old: str, new: str, message: str) -> None:
+def test_an_id_or_a_serial_number_that_no_moteus_has_is_refused_by_its_key(old: str, new: str, message: str) -> None:
     assert old in EXAMPLE
     with pytest.raises(ConfigurationError) as refused:
         parse_configuration(EXAMPLE.replace(old, new, 1))
