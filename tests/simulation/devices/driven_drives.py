@@ -24,14 +24,14 @@ class DrivenDrives:
         kind, _, model = name.partition(":")
         if model:
             settings["model"] = model
-        bus = MockBus()
-        self.far = bus.open()
+        self.bus = MockBus()
+        self.far = self.bus.open()
         record = DRIVE_TYPES[kind].parameters
         parameters = {
             joint: record(bus="a", node_id=number, type=kind, torque_constant_nm_a=CONSTANT_NM_A, **settings)
             for number, joint in enumerate(JOINTS, 1)
         }
-        self.drives = make_drives(parameters, {"a": bus.open()}, JointLimits(torque_rate_nm_s=10000.0))
+        self.drives = make_drives(parameters, {"a": self.bus.open()}, JointLimits(torque_rate_nm_s=10000.0))
         common: dict[str, Any] = {"current_noise_a": 0.0} | settings | dict(changes or {})
         self.devices = [
             make_simulated_drive(SimulatedDriveParameters(node_id=number, type=kind, **common), Random(1))
