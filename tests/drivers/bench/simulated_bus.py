@@ -31,10 +31,7 @@ class SimulatedBus:
         self.sent: list[Frame] = []
         self.energised = False  # whether a drive was energised at any time
         self.unplugged_after = 10**9  # frames of the bench, after which nothing passes the cable
-        self.restart_after = 10**9  # frames of the bench, after which the drives lose their supply for a moment
-
         self.at_frame: tuple[int, Callable[[], None]] = (10**9, lambda: None)  # number of a frame, and a call after it
-
         self.each_step: Callable[[], None] = lambda: None
 
     def bench_port(self, _: object = None) -> BenchPort:
@@ -54,9 +51,6 @@ class SimulatedBus:
                     self._answer(drive.receive(frame, self.now_s))
             if len(self.sent) == self.at_frame[0]:
                 self.at_frame[1]()
-            if len(self.sent) == self.restart_after:
-                for drive in self.drives:
-                    drive.restart(self.now_s)
         for drive in self.drives:
             drive.torque_nm(self.now_s)
             self.energised = self.energised or drive.energised
