@@ -31,11 +31,8 @@ def test_the_table_shows_every_component_with_every_kind_that_is_accepted(failur
     ("component", "kind", "said"),
     [
         ("left_knee", "off", "--list"),
-        ("", "off", "--list"),
         ("left_sweep", "sideways", "it can be off, stuck, garbage, slow, intermittent"),
-        ("left_sweep", "bus-off", "it can be"),
         ("left_sweep.command", "garbage", "it can be off, slow, intermittent"),
-        ("log", "slow", "it can be off, stuck, intermittent"),
         ("loop", "off", "it can be stuck, slow"),
     ],
 )
