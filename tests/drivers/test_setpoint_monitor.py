@@ -18,8 +18,9 @@ def make_monitor(command_delay_s: float = 0.0079) -> SetpointMonitor:
 
 
 def commanded(*torques_nm: float) -> SetpointMonitor:
+    """Return the monitor after these commands, or after three of 0.3 N·m."""
     monitor = make_monitor()
-    for torque_nm in torques_nm:
+    for torque_nm in torques_nm or [0.3] * 3:
         monitor.on_command(torque_nm)
     return monitor
 
@@ -37,13 +38,13 @@ def reports_until_found(monitor: SetpointMonitor, setpoints_nm: list[float], vel
 
 @pytest.mark.parametrize(("every", "longest"), [(1, 6), (2, 12), (4, 30), (10, 100), (20, 600)])
 def test_a_foreign_torque_after_every_nth_command_is_found(every: int, longest: int) -> None:
-    monitor = commanded(0.3, 0.3, 0.3)
+    monitor = commanded()
     found = reports_until_found(monitor, [1.0 if number % every == 0 else 0.3 for number in range(1000)])
     assert found is not None and found <= longest
 
 
 def test_one_report_in_thirty_that_differs_is_never_a_fault() -> None:
-    monitor = commanded(0.3, 0.3, 0.3)
+    monitor = commanded()
     assert reports_until_found(monitor, [1.0 if number % 30 == 0 else 0.3 for number in range(30000)]) is None
 
 
@@ -80,7 +81,7 @@ def test_a_drive_with_another_convention_of_its_torque_constant_is_no_mismatch(f
 
 @pytest.mark.parametrize("absent", [0.0, nan])
 def test_a_drive_that_left_closed_loop_by_itself_is_no_mismatch(absent: float) -> None:
-    monitor = commanded(0.3, 0.3, 0.3)
+    monitor = commanded()
     for _ in range(REPORTS_A_HEARTBEAT - 1):
         monitor.on_report(absent, 0.0)
     assert not monitor.found
@@ -90,7 +91,7 @@ def test_a_drive_that_left_closed_loop_by_itself_is_no_mismatch(absent: float) -
 
 
 def test_zero_torque_of_another_program_is_found_at_the_next_heartbeat() -> None:
-    monitor = commanded(0.3, 0.3, 0.3)
+    monitor = commanded()
     found = reports_until_found(monitor, [0.0, 0.3] * LONGEST_REPORTS)
     assert found == REPORTS_A_HEARTBEAT
 
@@ -116,7 +117,7 @@ def test_torque_that_speeds_a_fast_joint_up_is_a_mismatch(sign: int) -> None:
 
 
 def test_commands_that_may_not_have_left_are_not_expected_back() -> None:
-    monitor = commanded(0.3, 0.3, 0.3)
+    monitor = commanded()
     for _ in range(LONGEST_REPORTS):
         monitor.on_command(0.5)
         monitor.forget_commands()
@@ -129,7 +130,7 @@ def test_commands_that_may_not_have_left_are_not_expected_back() -> None:
 
 def test_a_mismatch_ends_with_the_closed_loop_and_with_matching_reports() -> None:
     for end in (lambda m: m.on_heartbeat(closed_loop=False), lambda m: [m.on_report(0.3, 0.0) for _ in range(300)]):
-        monitor = commanded(0.3, 0.3, 0.3)
+        monitor = commanded()
         assert reports_until_found(monitor, [1.0] * 20) is not None
         end(monitor)
         assert not monitor.found

@@ -74,22 +74,7 @@ def test_a_port_that_is_waited_for_is_off_and_says_why() -> None:
     assert list(port.receive()) == []
 
 
-def test_a_port_that_is_plugged_in_later_works_and_is_active_once_it_hears_something() -> None:
-    adapter = Adapter(plugged=False)
-    port = ReopeningPort(adapter.open, wait=True)
-    adapter.plugged = True
-    now_s = run(port, 0.0, 3.0, lambda: bool(adapter.opened))
-    assert state_of(port) is BusState.OFF
-    adapter.peer.send(FRAME)
-    assert list(port.receive()) == [FRAME]
-    assert state_of(port) is BusState.ACTIVE
-    port.send(FRAME)
-    assert adapter.peer.receive() == [FRAME]
-    run(port, now_s, 3.0)
-    assert len(adapter.opened) == 1
-
-
-def test_a_port_that_vanishes_is_closed_and_opened_again_when_it_is_back() -> None:
+def test_a_port_that_vanishes_is_closed_opened_again_when_it_is_back_and_active_once_it_hears_something() -> None:
     adapter = Adapter()
     port = ReopeningPort(adapter.open, wait=False)
     assert state_of(port) is BusState.ACTIVE
@@ -99,9 +84,14 @@ def test_a_port_that_vanishes_is_closed_and_opened_again_when_it_is_back() -> No
     assert adapter.opened[0] not in adapter.bus.ports
     adapter.plugged = True
     run(port, 3.0, 3.0, lambda: len(adapter.opened) == 2)
+    assert state_of(port) is BusState.OFF
     adapter.peer.send(FRAME)
     assert list(port.receive()) == [FRAME]
     assert state_of(port) is BusState.ACTIVE
+    port.send(FRAME)
+    assert adapter.peer.receive() == [FRAME]
+    run(port, 6.0, 3.0)
+    assert len(adapter.opened) == 2
 
 
 def test_counts_only_grow_over_all_the_ports_there_were_and_failed_sends_count_at_once() -> None:
