@@ -62,76 +62,76 @@ def test_an_input_that_vanished_names_the_way_back() -> None:
     assert "restart the daemon" in [switch.update(1.0), switch.update(2.0)][1]
 
 
-def gpio(value: Any, opened: list[Any]) -> dict[str, Any]:
-    """Return a module like gpiod 2 with one line."""
-    words = SimpleNamespace(ACTIVE="active", INACTIVE="inactive", INPUT="input", PULL_UP="pull up")
-
-    def request_lines(path: str, consumer: str, config: Any) -> Any:
-        opened.append((path, config))
-        return SimpleNamespace(get_value=lambda line: value)
-
-    line = SimpleNamespace(Bias=words, Direction=words, Value=words)
-    settings = lambda **given: given  # noqa: E731
-    return {"gpiod": SimpleNamespace(request_lines=request_lines, LineSettings=settings, line=line), "gpiod.line": line}
-
-
-class Evdev(SimpleNamespace):
-    """A module like evdev with one device, whose key 1 is pressed."""
-
-    ecodes = SimpleNamespace(ecodes={"KEY_ESC": 1, "KEY_A": 30, "KEY_B": 48}, EV_KEY=1, EV_ABS=3)
-
-    @staticmethod
-    def InputDevice(path: str) -> Any:  # noqa: N802
-        return SimpleNamespace(name="", active_keys=lambda: [1], capabilities=lambda absinfo: {1: [1, 30]})
-
-
 @pytest.mark.parametrize(
     ("value", "cut_value", "cut"),
-    [("active", 1, True), ("inactive", 1, False), ("active", 0, False), ("inactive", 0, True)],
+    [("ACTIVE", 1, True), ("INACTIVE", 1, False), ("ACTIVE", 0, False), ("INACTIVE", 0, True)],
 )
 def test_a_line_is_read_with_its_polarity(
     monkeypatch: pytest.MonkeyPatch, value: str, cut_value: int, cut: bool
 ) -> None:
-    opened: list[Any] = []
-    for name, module in gpio(value, opened).items():
-        monkeypatch.setitem(sys.modules, name, module)
+    gpiod, opened = pytest.importorskip("gpiod"), list[Any]()
+
+    def request_lines(path: str, consumer: str, config: Any) -> Any:
+        opened.append((path, config))
+        return SimpleNamespace(get_value=lambda line: gpiod.line.Value[value])
+
+    monkeypatch.setattr(gpiod, "request_lines", request_lines)
     switch = open_power_switch(EmergencyStopParameters("gpio", "/dev/gpiochip0", 17, cut_value=cut_value))
-    assert switch and opened == [("/dev/gpiochip0", {17: {"direction": "input", "bias": "pull up"}})]
+    pulled_up = gpiod.LineSettings(direction=gpiod.line.Direction.INPUT, bias=gpiod.line.Bias.PULL_UP)
+    assert switch and opened == [("/dev/gpiochip0", {17: pulled_up})]
     assert bool([switch.update(1.0), switch.update(2.0)][1]) is cut
 
 
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every device be a keyboard of the keys ESC, which is pressed, and A."""
+    pressed, keys = [1], [1, 30]
+    device = SimpleNamespace(name="", active_keys=lambda: pressed, capabilities=lambda absinfo: {1: keys})
+    monkeypatch.setattr(pytest.importorskip("evdev"), "InputDevice", lambda path: device)
+
+
+@pytest.mark.usefixtures("keyboard")
 @pytest.mark.parametrize(("key", "cut"), [("KEY_ESC", True), ("KEY_A", False)])
-def test_a_pressed_key_is_a_cut(monkeypatch: pytest.MonkeyPatch, key: str, cut: bool) -> None:
-    monkeypatch.setitem(sys.modules, "evdev", Evdev())
+def test_a_pressed_key_is_a_cut(key: str, cut: bool) -> None:
     switch = open_power_switch(EmergencyStopParameters("key", "/dev/input/event0", key=key))
     assert switch and bool([switch.update(1.0), switch.update(2.0)][1]) is cut
 
 
-@pytest.mark.parametrize(
-    ("source", "key", "module", "message"),
-    [
-        ("gpio", "", None, f"{sys.executable} -m pip install"),
-        ("key", "KEY_A", None, f"{sys.executable} -m pip install"),
-        ("key", "KEY_NONE", Evdev(), "KEY_NONE"),
-        ("key", "KEY_B", Evdev(), "no such key"),
-        ("key", "ABS_HAT0Y", Evdev(), "no such key"),  # an axis, and no direction of one
-        ("gpio", "", FileNotFoundError(2, "No such file"), "does not open: No such file"),
-        ("gpio", "", ValueError(22, "Invalid argument"), "does not open: Invalid argument"),  # by gpiod: no such line
-        ("gpio", "", NotImplementedError(95, "not supported"), "does not open: not supported"),  # no pull-up
-    ],
-)
-def test_an_input_that_does_not_open_is_one_sentence(
-    monkeypatch: pytest.MonkeyPatch, source: Any, key: str, module: Any, message: str
-) -> None:
-    modules = {"gpiod": module, "evdev": module}
-    if isinstance(module, Exception):
-        modules = gpio("", [])
-        modules["gpiod"].request_lines = lambda *_, **__: (_ for _ in ()).throw(module)
-    for name, each in modules.items():
-        monkeypatch.setitem(sys.modules, name, each)
+def refusal(source: Any, key: str = "") -> str:
     with pytest.raises(PowerSwitchError) as problem:
         open_power_switch(EmergencyStopParameters(source, "/dev/x", 17, key))
-    assert message in str(problem.value) and "\n" not in str(problem.value)
+    assert "\n" not in str(problem.value)
+    return str(problem.value)
+
+
+@pytest.mark.parametrize(("source", "library"), [("gpio", "gpiod"), ("key", "evdev")])
+def test_a_library_that_is_missing_is_named_with_the_command_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch, source: str, library: str
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    assert library in refusal(source) and f"{sys.executable} -m pip install" in refusal(source)
+
+
+@pytest.mark.usefixtures("keyboard")
+@pytest.mark.parametrize("key", ["KEY_NONE", "KEY_B", "ABS_HAT0Y"])  # the last is an axis, and no direction of one
+def test_a_key_that_the_device_has_not_is_named(key: str) -> None:
+    assert key in refusal("key", key) and "no such key" in refusal("key", key)
+
+
+@pytest.mark.parametrize(
+    ("problem", "message"),
+    [
+        (FileNotFoundError(2, "No such file"), "does not open: No such file"),
+        (ValueError(22, "Invalid argument"), "does not open: Invalid argument"),  # by gpiod: no such line
+        (NotImplementedError(95, "not supported"), "does not open: not supported"),  # no pull-up
+    ],
+)
+def test_a_line_that_does_not_open_says_why(monkeypatch: pytest.MonkeyPatch, problem: Exception, message: str) -> None:
+    def request_lines(*_: Any, **__: Any) -> None:
+        raise problem
+
+    monkeypatch.setattr(pytest.importorskip("gpiod"), "request_lines", request_lines)
+    assert message in refusal("gpio")
 
 
 @pytest.mark.parametrize(("source", "library"), [("gpio", "gpiod"), ("key", "evdev")])
