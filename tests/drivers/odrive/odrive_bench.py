@@ -1,12 +1,12 @@
-"""Four ODrives as joints, and the far ends of their two buses, whose frames the tests write."""
+"""ODrives as joints, and the far ends of their two buses, whose frames the tests write."""
 
 from collections.abc import Mapping, Sequence
 
 from control.parameters.joint_limits import JointLimits
-from control.records import NEVER_S
+from control.records import NEVER_S, DriveState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.drive import WatchdogEndpoints
+from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.drive_types import make_drives
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import HEARTBEAT, Message, arbitration_id
@@ -39,6 +39,14 @@ class OdriveBench:
         axis = self.drives.axes[0]
         assert isinstance(axis, OdriveAxis)
         return axis
+
+    @property
+    def state(self) -> DriveState:
+        return self.drives.axes[0].state
+
+    @property
+    def health(self) -> DriveHealth:
+        return self.drives.health[0]
 
     def report(self, message: Message, *values: float, joint: str = "left_sweep", stamp_s: float = NEVER_S) -> None:
         drive = self.parameters[joint]

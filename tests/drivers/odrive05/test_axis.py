@@ -7,18 +7,15 @@ from typing import Any
 import pytest
 
 from control.rate import PERIOD_S
-from control.records import DriveState, Joints
+from control.records import Joints
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
-from drivers.drive import DriveHealth
-from drivers.drive_types import make_drives
 from drivers.odrive import codec
-from drivers.odrive.codec import Message, arbitration_id
+from drivers.odrive.codec import arbitration_id
 from drivers.odrive05 import codec as codec05
-from drivers.odrive05.axis import Odrive05Axis
 from drivers.odrive05.parameters import Odrive05Parameters
+from tests.drivers.odrive.odrive_bench import OdriveBench
 
-JOINT, NODE = "left_sweep", 3
+NODE = 3
 COUNTS = Frame(arbitration_id(NODE, codec05.GET_ENCODER_COUNT), is_remote=True)
 VERSION = Frame(arbitration_id(NODE, codec.GET_VERSION), is_remote=True)
 CLEAR = Frame(arbitration_id(NODE, codec05.CLEAR_ERRORS))
@@ -28,14 +25,11 @@ EXPIRED, ENCODER = codec05.ERROR_WATCHDOG, codec05.ERROR_ENCODER
 HEARTBEAT_TICKS = 38
 
 
-class Bench:
+class Bench(OdriveBench):
     """One drive whose reports the tests write, and a clock that ticks as the loop does."""
 
     def __init__(self, **changes: Any) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        parameters = Odrive05Parameters("one", NODE, **changes)
-        self.drives = make_drives({JOINT: parameters}, {"one": bus.open()})
+        super().__init__({"left_sweep": Odrive05Parameters("left", NODE, **changes)})
         self.now_s = 0.0
         self.state_of_axis, self.error, self.parts = IDLE, 0, (0, 0, 0)
         self.expires = True  # after a tenth of a second without a frame
@@ -44,22 +38,9 @@ class Bench:
         self.sent: list[Frame] = []
         self._silent_ticks = self._tick = 0
 
-    @property
-    def axis(self) -> Odrive05Axis:
-        axis = self.drives.axes[0]
-        assert isinstance(axis, Odrive05Axis)
-        return axis
-
-    @property
-    def state(self) -> DriveState:
-        return self.axis.state
-
-    @property
-    def health(self) -> DriveHealth:
-        return self.drives.health[0]
-
-    def report(self, message: Message, *values: float) -> None:
-        self.far.send(Frame(arbitration_id(NODE, message), message.encode(*values)))
+    def commands(self) -> list[Frame]:
+        """Return the frames that this program has sent."""
+        return self.far["left"].receive()
 
     def read(self) -> None:
         self.now_s += PERIOD_S
@@ -80,7 +61,7 @@ class Bench:
             self.drives.poll()
         else:
             self.drives.send(Joints(0.0), PERIOD_S)
-        self.sent = self.far.receive()
+        self.sent = self.commands()
         if CLEAR in self.sent:
             self.error = 0
         self._silent_ticks = 0 if self.sent else self._silent_ticks + 1
@@ -180,7 +161,7 @@ def test_other_errors_are_neither_cleared_nor_hidden_by_the_watchdog_s(bench: Be
     assert isnan(bench.health.watchdog_s) and bench.state.error_flags == ENCODER
     assert not isnan(bench.state.angle_rad)  # a robot that waits for it would neither report nor clear the error
     bench.drives.clear_errors()
-    bench.far.receive()
+    bench.commands()
     bench.error = 0
     bench.run()
     assert bench.health.watchdog_s == 0.1
@@ -212,12 +193,12 @@ def test_arming_clears_a_watchdog_that_expired_while_idle_first(bench: Bench) ->
     bench.run()
     assert bench.error == EXPIRED  # since the proof
     bench.drives.arm(bench.now_s, at_once=True)
-    sent = bench.far.receive()
+    sent = bench.commands()
     assert sent[0] == CLEAR and sent.count(CLEAR) == 1
     bench.error = 0
     bench.run(0.2)
     bench.drives.arm(bench.now_s, at_once=True)
-    assert CLEAR not in bench.far.receive()
+    assert CLEAR not in bench.commands()
 
 
 def test_while_it_is_to_follow_no_silence_begins_even_where_arming_was_forced(bench: Bench) -> None:
@@ -225,7 +206,7 @@ def test_while_it_is_to_follow_no_silence_begins_even_where_arming_was_forced(be
     bench.run(0.15)
     assert isnan(bench.health.watchdog_s)
     bench.drives.arm(bench.now_s)
-    bench.far.receive()
+    bench.commands()
     assert all(bench.run(0.5))
     bench.state_of_axis = CLOSED_LOOP
     assert all(ZERO in frames for frames in bench.run(0.5))
@@ -273,17 +254,15 @@ def test_the_encoder_s_direction_turns_currents_into_the_sign_of_torque_and_posi
     bench.state_of_axis = CLOSED_LOOP
     bench.run(0.3)
     bench.drives.gate.open()
-    for noise_a in (0.1, 0.0) * 200:
-        bench.drives.send(Joints(0.2), PERIOD_S)
-        bench.report(codec.GET_IQ, sign * direction * 0.2 / 0.083, sign * direction * (2.0 + noise_a))
-        bench.read()
-    assert bench.state.current_a == 2.0
-    assert bench.health.setpoint_problem == ""
-    for noise_a in (0.1, 0.0) * 200:
-        bench.drives.send(Joints(0.2), PERIOD_S)
-        bench.report(codec.GET_IQ, -sign * direction * 0.2 / 0.083, noise_a)
-        bench.read()
-    assert "-0.2 N·m" in bench.health.setpoint_problem
+    for setpoint_nm, current_a in ((0.2, 2.0), (-0.2, 0.0)):
+        for noise_a in (0.1, 0.0) * 200:
+            bench.drives.send(Joints(0.2), PERIOD_S)
+            currents_a = setpoint_nm / 0.083, current_a + noise_a
+            bench.report(codec.GET_IQ, *(sign * direction * each_a for each_a in currents_a))
+            bench.read()
+        assert bench.state.current_a == current_a
+        problem = bench.health.setpoint_problem
+        assert ("-0.2 N·m" in problem) is (problem != "") is (setpoint_nm < 0.0)
 
 
 def test_errors_of_the_parts_are_named_and_only_where_they_have_failed(bench: Bench) -> None:
@@ -302,7 +281,7 @@ def test_errors_of_the_parts_are_named_and_only_where_they_have_failed(bench: Be
 def test_a_drive_that_answers_for_its_counts_and_not_for_its_version_has_this_firmware(bench: Bench) -> None:
     assert (bench.health.firmware, bench.health.firmware_supported) == ("", False)
     bench.drives.request_settings(1.0)
-    assert bench.far.receive() == [VERSION, COUNTS]
+    assert bench.commands() == [VERSION, COUNTS]
     bench.report(codec05.GET_ENCODER_COUNT, 0, 0)
     bench.read()
     assert (bench.health.firmware, bench.health.firmware_supported) == ("0.5", True)
@@ -316,7 +295,7 @@ def test_a_drive_with_a_version_has_another_firmware(bench: Bench) -> None:
     assert bench.health.supported_firmware == "0.5"
     for now_s in (1.0, 12.0):
         bench.drives.request_settings(now_s)
-    assert set(bench.far.receive()) <= {VERSION, COUNTS}  # firmware 0.5 would take a question for its id as a new one
+    assert set(bench.commands()) <= {VERSION, COUNTS}  # firmware 0.5 would take a question for its id as a new one
     assert bench.drives.refused_commands == 0
 
 
@@ -391,4 +370,4 @@ def test_nothing_is_asked_of_a_drive_that_was_never_heard(bench: Bench) -> None:
     for _ in range(100):
         bench.read()
         bench.drives.poll()
-    assert bench.far.receive() == []
+    assert bench.commands() == []
