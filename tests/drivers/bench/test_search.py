@@ -2,24 +2,25 @@
 
 import pytest
 
-from control.parameters.joint_limits import JointLimits
 from drivers.bench.drive_setup import FoundDrive
-from drivers.bench.search import expectation_problems, id_problems, search
+from drivers.bench.search import SearchResult, expectation_problems, id_problems, search
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
 from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
 from drivers.odrive import codec as odrive
 from drivers.odrive.parameters import OdriveParameters
-from drivers.transmit_gate import TransmitGate
 from simulation.devices.drive import Forgery
 from simulation.devices.simulated_drive import SimulatedDrive
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
+from tests.drivers.gate_bench import GateBench
 
-ANY_ID = 5
+
+def search_of(bus: SimulatedBus, *names: str, fd: bool = False) -> SearchResult:
+    """Search a bus for drives of these types, or of all."""
+    return search(bus.bench_port(), DRIVE_BENCHES, fd, names)
 
 
 def found(*drives: SimulatedDrive, fd: bool = False) -> tuple[FoundDrive, ...]:
-    return search(SimulatedBus(*drives).bench_port(), DRIVE_BENCHES, fd).found
+    return search_of(SimulatedBus(*drives), fd=fd).found
 
 
 @pytest.mark.parametrize(
@@ -60,7 +61,7 @@ def test_a_cubemars_that_reports_by_extended_ids_is_named_as_unsupported() -> No
     bus = SimulatedBus(simulated("mit", 15, model="AK80-9"))
     report = Frame(0x2900 | 104, bytes.fromhex("0000 0000 0000 1e00"), is_extended=True)
     bus.each_step = lambda: bus._far.send(report)
-    drives = {each.node_id: each.problem for each in search(bus.bench_port(), DRIVE_BENCHES, False).found}
+    drives = {each.node_id: each.problem for each in search_of(bus).found}
     assert drives.keys() == {15, 104} and drives[15] == "" and "0x29xx" in drives[104]
 
 
@@ -71,8 +72,7 @@ def test_ranges_of_no_model_are_a_problem() -> None:
 
 def test_firmware_0_5_is_found_by_its_heartbeat_and_the_counts_of_its_encoder() -> None:
     bus = SimulatedBus(simulated("odrive05", 7), simulated("odrive", 3, "385f324d3037"))
-    result = search(bus.bench_port(), DRIVE_BENCHES, False).found
-    assert [each[:5] for each in result] == [
+    assert [each[:5] for each in search_of(bus).found] == [
         ("odrive", 3, "0.0.0", "0.6.11", "385f324d3037"),
         ("odrive05", 7, "", "0.5", ""),
     ]
@@ -96,7 +96,7 @@ def test_firmware_without_serial_numbers_is_not_asked_for_one(
     """Before 0.6.9 the message was another one, which sets the node id."""
     monkeypatch.setattr("simulation.devices.odrive.device.VERSION_FIELDS", (2, 0, 0, 0, 0, 6, revision, 0))
     bus = SimulatedBus(simulated("odrive", 3, "385f324d3037"))
-    (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found
+    (drive,) = search_of(bus).found
     address = odrive.arbitration_id(3, odrive.ADDRESS)
     assert (address in {frame.arbitration_id for frame in bus.sent}) == asked == bool(drive.serial_number)
 
@@ -126,14 +126,14 @@ def test_no_serial_number_is_asked_for_where_one_of_two_drives_would_take_it_for
     ]
     drives = [old, simulated("odrive", 3)]
     bus = SimulatedBus(*drives[:: 1 if old_first else -1])
-    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False).found)
+    (problem,) = id_problems(search_of(bus).found)
     assert "id 3 answers 2 times" in problem
     assert odrive.arbitration_id(3, odrive.ADDRESS) not in {frame.arbitration_id for frame in bus.sent}
 
 
 def test_an_id_that_answers_in_two_protocols_is_named() -> None:
     bus = SimulatedBus(simulated("odrive", 3), simulated("mit", 3))
-    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False, ("odrive", "mit")).found)
+    (problem,) = id_problems(search_of(bus, "odrive", "mit").found)
     assert "id 3 answers as mit and as odrive" in problem
 
 
@@ -152,37 +152,32 @@ def test_another_serial_number_than_the_configured_one_is_named() -> None:
 
 def test_where_an_odrive_answers_no_other_protocol_is_asked() -> None:
     bus = SimulatedBus(simulated("odrive", 0))
-    result = search(bus.bench_port(), DRIVE_BENCHES, True)
+    result = search_of(bus, fd=True)
     assert set(result.not_asked) == {"mit", "moteus"}
     assert {frame.is_remote for frame in bus.sent} == {True}
 
 
 def test_where_a_moteus_answers_no_classic_frame_that_it_takes_for_a_mode_is_sent() -> None:
     bus = SimulatedBus(simulated("moteus", 3))
-    assert set(search(bus.bench_port(), DRIVE_BENCHES, True).not_asked) == {"mit"}
+    assert set(search_of(bus, fd=True).not_asked) == {"mit"}
     assert all(frame.is_remote or frame.is_fd for frame in bus.sent)
 
 
 def test_no_fd_frame_is_sent_on_a_bus_without_fd() -> None:
     bus = SimulatedBus()
-    result = search(bus.bench_port(), DRIVE_BENCHES, False, ("moteus",))
-    assert result.not_asked == {"moteus": "the bus is configured without CAN FD"} and not bus.sent
+    assert search_of(bus, "moteus").not_asked == {"moteus": "the bus is configured without CAN FD"} and not bus.sent
 
 
 @pytest.mark.parametrize("name", DRIVE_BENCHES)
 def test_no_question_is_a_command_of_torque(name: str) -> None:
     """The daemon's own gate, closed, lets every question of a search pass, and no drive follows torque after it."""
-    node_id = ANY_ID
-    bus = SimulatedBus(simulated(name, node_id))
-    search(bus.bench_port(), DRIVE_BENCHES, True, (name,))
-    parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=node_id, type=name, serial_number="1")
-    gate = TransmitGate(JointLimits())
-    outlet = gate.outlet(MockBus().open(), [DRIVE_TYPES[name].gate_table(parameters)])
-    content = [(frame, DRIVE_TYPES[name].read_frame(frame)) for frame in bus.sent]
-    own = [frame for frame, read in content if read and read.node_id == node_id]
-    for frame in own:
-        outlet.send(frame)
-    assert own and not gate.refused, gate.last_refusal
+    bus = SimulatedBus(simulated(name, 5))
+    search_of(bus, name, fd=True)
+    drive_type = DRIVE_TYPES[name]
+    own = [frame for frame in bus.sent if (content := drive_type.read_frame(frame)) and content.node_id == 5]
+    parameters = drive_type.parameters(bus="can", node_id=5, type=name, serial_number="1")
+    gate = GateBench([drive_type.gate_table(parameters)])
+    assert own and [frame for frame in own if gate.passed(frame) != [frame]] == []
     assert not bus.energised
 
 
