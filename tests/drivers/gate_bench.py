@@ -43,8 +43,7 @@ class Protocol(NamedTuple):
     idle: bytes = b""
 
     def torque_frame(self, data: bytes) -> Frame:
-        return Frame(self.table.torque_id, data, False, False, self.table.kind[0], is_fd=self.table.kind[1],
-                     bit_rate_switch=self.table.kind[2])  # fmt: skip
+        return Frame(self.table.torque_id, data, **self.table.kind._asdict())
 
 
 def odrive(node: int = NODE) -> Protocol:

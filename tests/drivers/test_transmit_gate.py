@@ -36,8 +36,8 @@ HARMLESS_IDS = {frame.arbitration_id for drive in DRIVES for frame in drive.alwa
 class Bench(GateBench):
     """The gate with two ODrives."""
 
-    def __init__(self, limits: JointLimits = LIMITS) -> None:
-        super().__init__([drive.table for drive in DRIVES], limits)
+    def __init__(self, limits: JointLimits = LIMITS, is_open: bool = False) -> None:
+        super().__init__([drive.table for drive in DRIVES], limits, is_open)
 
     def torque(self, torque_nm: float, identifier: int = MOTOR) -> float:
         """Send a torque and return the torque that leaves."""
@@ -54,9 +54,7 @@ def bench() -> Bench:
 
 @pytest.fixture
 def armed() -> Bench:
-    bench = Bench()
-    bench.gate.open()
-    return bench
+    return Bench(is_open=True)
 
 
 @pytest.mark.parametrize(
@@ -99,8 +97,7 @@ def test_a_gate_is_closed_until_it_is_opened_and_lets_zero_pass_only(bench: Benc
 def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_it_up(
     limit_nm: float, sign: float
 ) -> None:
-    bench = Bench(JointLimits(torque_nm=limit_nm, torque_rate_nm_s=1e9))
-    bench.gate.open()
+    bench = Bench(JointLimits(torque_nm=limit_nm, torque_rate_nm_s=1e9), is_open=True)
     assert bench.torque(sign * limit_nm) == pytest.approx(sign * limit_nm)
     assert bench.torque(sign * (limit_nm + 4e-6)) == 0.0
     assert bench.gate.refused == 1
@@ -195,9 +192,7 @@ def test_opening_an_open_gate_changes_nothing(armed: Bench) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from([MOTOR, OTHER]), st.floats(width=32)), max_size=30), st.booleans())
 def test_every_torque_that_leaves_is_within_limit_and_slew(torques: list[tuple[int, float]], is_open: bool) -> None:
-    bench = Bench()
-    if is_open:
-        bench.gate.open()
+    bench = Bench(is_open=is_open)
     left_nm = {MOTOR: 0.0, OTHER: 0.0}
     for identifier, wanted_nm in torques:
         before_nm, sent_nm = left_nm[identifier], bench.torque(wanted_nm, identifier)
