@@ -195,12 +195,12 @@ def test_errors_of_a_damiao_are_cleared_and_those_of_a_cubemars_only_end() -> No
 
 
 def run_following(
-    bench: Bench, commanded_nm: float, measured_nm: float, ticks: int, velocity_rad_s: float = 0.0
+    bench: Bench, commanded_nm: float, measured_nm: float, velocity_rad_s: float = 0.0, every: int = 2
 ) -> None:
-    """Command a torque in every tick; the drive measures another one in every second answer."""
-    for tick in range(ticks):
+    """Command a torque in every tick; the drive measures another one in every `every`th answer."""
+    for tick in range(40):
         bench.axis.send_torque(commanded_nm)
-        torque_nm = measured_nm if tick % 2 else commanded_nm
+        torque_nm = commanded_nm if tick % every else measured_nm
         bench.answer(codec.ENABLED, torque_nm=torque_nm, velocity_rad_s=velocity_rad_s)
 
 
@@ -213,21 +213,21 @@ def test_a_motor_whose_voltage_is_used_up_gives_less_torque_than_commanded(
 ) -> None:
     bench = Bench("DM4340P")  # whose speeds end at 10 rad/s
     bench.enter()
-    run_following(bench, commanded_nm, 0.0, 40, velocity_rad_s)
+    run_following(bench, commanded_nm, 0.0, velocity_rad_s)
     assert (bench.axis.health.setpoint_problem == "") == is_clamped
 
 
 def test_a_torque_that_was_not_commanded_again_and_again_is_another_program_s() -> None:
     bench = Bench(DAMIAO)
     bench.enter()
-    run_following(bench, 0.5, 0.5, 40)
+    run_following(bench, 0.5, 0.5)
     assert bench.axis.health.setpoint_problem == ""
-    run_following(bench, 0.5, -0.5, 40)
+    run_following(bench, 0.5, -0.5)
     assert "where 0.5 N·m was commanded" in bench.axis.health.setpoint_problem
     bench.axis.disarm()
     bench.answer(codec.DISABLED)
     assert bench.axis.health.setpoint_problem == ""
-    run_following(bench, 0.5, 0.5, 40)
+    run_following(bench, 0.5, 0.5)
     bench.axis.disarm()
     for tick in range(40):  # what an idle drive measures belongs to no command
         bench.answer(codec.DISABLED, torque_nm=tick % 2)
@@ -237,9 +237,7 @@ def test_a_torque_that_was_not_commanded_again_and_again_is_another_program_s() 
 def test_torque_that_stays_away_is_not_another_program_s() -> None:
     bench = Bench(DAMIAO)
     bench.enter()
-    for _ in range(40):
-        bench.axis.send_torque(0.5)
-        bench.answer(codec.ENABLED, torque_nm=-0.5)
+    run_following(bench, 0.5, -0.5, every=1)
     assert bench.axis.health.setpoint_problem == ""
 
 
