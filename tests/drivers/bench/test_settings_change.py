@@ -82,16 +82,6 @@ def test_settings_that_differ_are_written_and_outlast_a_restart(name: str) -> No
 
 
 @each_type
-def test_written_settings_that_were_not_stored_are_lost_in_a_restart(name: str) -> None:
-    bench = Bench(name)
-    for key, value in bench.new.items():
-        bench.drive.write(key, value)
-    assert bench.state() == "new"
-    bench.switch_off_and_on()
-    assert bench.state() == "old"
-
-
-@each_type
 def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
     """Ctrl-C comes before any setting, or before the storing."""
     for calls in range(len(Bench(name).new) + 1):

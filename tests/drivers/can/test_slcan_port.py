@@ -156,13 +156,13 @@ def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_l
     assert kept[: kept.index(FRAMES[1])] == taken
 
 
-def test_an_unplugged_adapter_is_reported_and_raises_nothing(bench: Bench) -> None:
-    other = Bench()
-    other.adapter.unplug()
-    other.port.receive()
-    assert other.port.state is BusState.OFF
-    assert other.port.error_frames == 1
-    other.port.send(FRAMES[0])
-    assert other.port.failed_sends == 1
-    assert "Input/output error" in other.port.last_error and "Input/output error" in other.port.last_send_error
-    other.port.close()
+def test_an_unplugged_adapter_is_reported_and_raises_nothing() -> None:
+    bench = Bench()
+    bench.adapter.unplug()
+    bench.port.receive()
+    assert bench.port.state is BusState.OFF
+    assert bench.port.error_frames == 1
+    bench.port.send(FRAMES[0])
+    assert bench.port.failed_sends == 1
+    assert "Input/output error" in bench.port.last_error and "Input/output error" in bench.port.last_send_error
+    bench.port.close()
