@@ -1,7 +1,8 @@
 """Runs an attended walk: the robot walks for as long as this program renews its lease.
 
-Ctrl-C stops the robot and waits until it holds. If this program dies or hangs for longer than its lease, the daemon
-stops the robot. A control law (run.py) may order each stride, or move the joints of a robot that holds its pose.
+Ctrl-C stops the robot and waits until it holds; a second one does not wait. If this program dies or hangs for longer
+than its lease, the daemon stops the robot. A control law (run.py) may order each stride, or move the joints of a robot
+that holds its pose.
 """
 
 import sys
@@ -64,7 +65,11 @@ def _attend(
         complain("the reader of the output has closed it: the robot stops")
         client.call("stop")
         status = exit_codes.INTERRUPTED
-    report = _renew(client, as_json)
+    try:
+        report = _renew(client, as_json)
+    except KeyboardInterrupt:
+        complain("the robot was still stopping: it goes on without this command, and then its torque goes off")
+        raise
     client.call("release")
     return _conclude("run" if law else "walk", report, status)
 

@@ -100,6 +100,13 @@ def test_ctrl_c_stops_the_robot_and_waits_for_it(bench: Bench) -> None:
     assert bench.wait_for(lambda report: True)["mode"] == "hold"
 
 
+def test_a_second_ctrl_c_does_not_wait_and_says_what_becomes_of_the_robot(capsys: pytest.CaptureFixture[str]) -> None:
+    client = FakeClient(next_of(report("walking"), KeyboardInterrupt(), report("stopping"), KeyboardInterrupt()))
+    with pytest.raises(KeyboardInterrupt):
+        attended_walk.attend(client, True, {})
+    assert client.calls.count("stop") == 1 and "torque goes off" in capsys.readouterr().err
+
+
 def test_a_reader_that_closes_the_output_stops_the_robot(bench: Bench) -> None:
     bench.run("arm")
     with attended(bench) as walk:
