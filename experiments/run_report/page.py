@@ -62,7 +62,7 @@ ORIGINS = {
     MudsFrom.LOG: "The mud is the one that the log names.",
     MudsFrom.FILE: "The mud is the label in the name of the file.",
     MudsFrom.ROBOT: "The log names no muds: each is one that the robot noticed, described by its k_p and, "
-    "where two of a walk are alike, by when it begins in that walk.",
+    "where two are alike, by its walk or when it begins in that walk.",
 }
 WALK = (
     "Forces, coefficients and depth of each flipper, position and steps of the body. Bars are two standard errors, "

@@ -160,9 +160,11 @@ def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk])
 
 def _describe_strides(walks: Sequence[RecordedWalk], layout: MudLayout | None) -> DataFrame:
     """Return the rows of STRIDES."""
-    found = []
+    found, named = [], set[str]()  # muds that the robot noticed in earlier walks may be others
     for number, walk in enumerate(walks, 1):
         regions = mud_regions(walk, None) if layout is None else []
+        regions = [each._replace(name=each.name + f", walk {number}" * (each.name in named)) for each in regions]
+        named.update(each.name for each in regions)
         by_index: dict[int, list[Stride]] = {}
         for row in sorted(walk.strides, key=lambda row: int(row["index"])):
             by_index.setdefault(row["index"], []).append(row)

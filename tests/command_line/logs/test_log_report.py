@@ -83,20 +83,23 @@ def after(log: Log, uptime_s: float) -> Log:
 
 
 def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The operator names a mud by name and length or by a world file; a mud without a name is described by its k_p."""
+    """The operator names a mud by name and length or by a world file; a mud without a name is described by its k_p.
+
+    Both walks are in one mud, as only a name can say.
+    """
     out = ("--out", str(tmp_path))
-    unnamed = shown(monkeypatch, str(two_walks), *out)[1]["Result"][1]
-    assert re.fullmatch(r"k_p 1\.\d N/cm³", unnamed[0])
-    named = shown(monkeypatch, str(two_walks), *out, "--mud", "pond=60")[1]["Result"][1]
-    assert named == ["pond", *unnamed[1:]]
+    _, first, second = shown(monkeypatch, str(two_walks), *out)[1]["Result"]
+    assert re.fullmatch(r"k_p 1\.\d N/cm³", first[0]) and second[0] == f"{first[0]}, walk 2"
+    _, named = shown(monkeypatch, str(two_walks), *out, "--mud", "pond=60")[1]["Result"]
+    assert named[0] == "pond" and int(named[1]) == int(first[1]) + int(second[1])
     world = tmp_path / "world.toml"
     world.write_text(
         "[[segment]]\nstart_m = 0.0\nend_m = 0.5\nwater_percent = 48.5\n"
         "[[segment]]\nstart_m = 0.5\nend_m = 1.0\nwater_percent = 50.0\n",
         encoding="utf-8",
     )
-    known = shown(monkeypatch, str(two_walks), *out, "--world", str(world))[1]["Result"][1]
-    assert known == ["w = 48.5 %", *unnamed[1:]]
+    _, known = shown(monkeypatch, str(two_walks), *out, "--world", str(world))[1]["Result"]
+    assert known == ["w = 48.5 %", *named[1:]]
 
 
 def test_a_log_that_is_cut_off_before_its_first_stride_ends_is_named_in_headline_json_and_exit_status(

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.strokes.fit_samples import FitSamples
+from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.run_report.figures import draw_fits
 from experiments.run_report.page import group_events, quality_rows
 from experiments.run_report.run import Run, read_runs
@@ -21,7 +22,7 @@ BY_HAND = FitSamples([1e-7, 2e-7, 3e-7], [0.2, 0.3, 0.7], [0.001] * 3, 2.0 * K) 
 
 @pytest.fixture(scope="module")
 def run(two_walks: Path) -> Run:
-    return read_runs([two_walks], None, unwatched)[0]
+    return read_runs([two_walks], layout_of_lengths([("48.5", 0.61)]), unwatched)[0]
 
 
 def samples_of(run: Run, flipper: str, name: str) -> list[FitSamples]:

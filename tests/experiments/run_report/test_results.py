@@ -126,7 +126,7 @@ def test_a_log_s_estimates_stand_even_if_this_version_would_estimate_otherwise(
     log = read_log(two_walks)
     older = log._replace(strides=[row | {"k_p": 1.01 * row["k_p"]} for row in log.strides])
     monkeypatch.setattr("experiments.run_report.run.scan_log", lambda *_: older)
-    (run,) = read_runs([two_walks], None, unwatched)
+    (run,) = read_runs([two_walks], layout_of_lengths(MUDS[:1]), unwatched)
     fitted = run.estimates.groupby("coefficient")["samples"].count()
     assert (fitted["k_p"], fitted["k_e"]) == (0, len(log.strides))
     values = [row["k_p"] for row in older.strides]
