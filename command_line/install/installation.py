@@ -22,6 +22,7 @@ from command_line.install.service_plan import (
     WriteFile,
     plan_installation,
     plan_removal,
+    require_interfaces,
 )
 from command_line.screen import complain
 from experiments.study.option import Option
@@ -94,6 +95,7 @@ def install(
     if refusal:
         complain(refusal)
         return exit_codes.REFUSED
+    require_interfaces(system.root / CONFIGURATION)
     plan = plan_installation(system)
     status = _carry_out(plan, system, dry_run, find)
     is_new = any(isinstance(step, WriteFile) and step.path == system.root / CONFIGURATION for step in plan.steps)

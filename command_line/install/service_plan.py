@@ -18,6 +18,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from command_line import exit_codes
+from command_line.errors import CommandError
 from firmware_host.sockets.user_groups import VIEWERS
 
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
@@ -26,6 +28,7 @@ LINKS = ("usr/local/bin/mudskipper", "usr/local/bin/mudskipperd")
 DEVICE = "sys-subsystem-net-devices-{}.device"
 DEFAULT_DEVICES = f"{DEVICE.format('can0')} {DEVICE.format('can1')}"  # in the unit
 INTERFACE = re.compile(r"[\w.-]+", re.ASCII)  # a name that needs no quotes in a unit
+NOT_SAID = (ValueError, LookupError, TypeError, AttributeError)  # by a configuration that makes no sense
 UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
 SERVICE, LIVE_SERVICE = "mudskipper", "mudskipper-live"
 NETWORKD, WAIT_ONLINE = "systemd-networkd", "systemd-networkd-wait-online"
@@ -119,9 +122,20 @@ def load_sources(prefix: Path, folder: Path | None = None, configuration: str = 
     texts = {path: ((folder or source_folder()) / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
     for unit in (UNIT, LIVE_UNIT):
         texts[unit] = texts[unit].replace(DEFAULT_PREFIX, str(prefix))
-    with suppress(ValueError, LookupError, TypeError, AttributeError):  # the daemon says what is wrong with it
+    with suppress(*NOT_SAID):
         texts[UNIT] = _bound_to(_interfaces(tomllib.loads(configuration)), texts[UNIT])
     return texts
+
+
+def require_interfaces(path: Path) -> None:
+    """Raise CommandError where a configuration does not say for which interfaces the unit waits."""
+    with suppress(FileNotFoundError):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        try:
+            _interfaces(tomllib.loads(text))
+        except NOT_SAID:
+            refusal = f"{path} does not say which buses the service waits for: 'mudskipperd --check-config' says why"
+            raise CommandError(refusal, status=exit_codes.CONFIGURATION) from None
 
 
 def _interfaces(configuration: dict[str, Any]) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.errors import CommandError
 from command_line.install import installation, service_plan
 from command_line.install.installation import StepError, install, location_problem, perform, run_command, uninstall
 from command_line.install.service_plan import (
@@ -205,12 +206,15 @@ def test_a_second_installation_lets_the_unit_wait_for_the_configured_buses(
     assert machine.install() == exit_codes.OK and not machine.ran
 
 
-def test_with_a_configuration_that_makes_no_sense_the_unit_waits_for_the_default_interfaces(machine: Machine) -> None:
+@pytest.mark.parametrize("text", ["[bus", "bus = 3", "[bus]\nleft = 1", '[bus.left]\ninterface = "socketcan"', ""])
+def test_a_configuration_that_makes_no_sense_is_refused_and_can_be_removed(machine: Machine, text: str) -> None:
     machine.install()
-    before = machine.text(UNIT)
-    for text in ("[bus", "bus = 3", "[bus]\nleft = 1", '[bus.left]\ninterface = "socketcan"', ""):
-        (machine.root / CONFIGURATION).write_text(text, encoding="utf-8")
-        assert machine.install() == exit_codes.OK and machine.text(UNIT) == before
+    (machine.root / CONFIGURATION).write_text(text, encoding="utf-8")
+    before = machine.files()
+    with pytest.raises(CommandError) as refused:
+        machine.install()
+    assert refused.value.status == exit_codes.CONFIGURATION and machine.files() == before
+    assert machine.uninstall() == exit_codes.OK and not (machine.root / UNIT).exists()
 
 
 def test_a_system_with_networkd_keeps_its_wait_for_the_network(machine: Machine) -> None:
@@ -352,11 +356,11 @@ def test_files_that_were_there_before_stay(machine: Machine) -> None:
     other = LINKS[0]
     for path in (CONFIGURATION, UNIT, other):
         (machine.root / path).parent.mkdir(parents=True, exist_ok=True)
-    (machine.root / CONFIGURATION).write_text("[robot]\n", encoding="utf-8")
+    (machine.root / CONFIGURATION).write_text("[bus]\n", encoding="utf-8")
     (machine.root / other).write_text("#!/bin/sh\n", encoding="utf-8")
     (machine.root / UNIT).symlink_to("/dev/null")  # a masked unit
     machine.install()
-    assert machine.text(CONFIGURATION) == "[robot]\n" and (machine.root / UNIT).readlink() == Path("/dev/null")
+    assert machine.text(CONFIGURATION) == "[bus]\n" and (machine.root / UNIT).readlink() == Path("/dev/null")
     machine.uninstall(purge=True)
     assert machine.text(other) == "#!/bin/sh\n"
 
