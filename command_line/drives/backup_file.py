@@ -28,11 +28,11 @@ class Backup(NamedTuple):
     new: dict[str, float]
 
     def state(self, values: Mapping[str, float]) -> str:
-        """Say which of both settings these are."""
+        """Name which of both settings these are."""
         for name, expected in (("new", self.new), ("old", self.old)):
             if all(key in values and same(values[key], value) for key, value in expected.items()):
-                return f"has the {name} settings"
-        return "has neither the old nor the new settings"
+                return f"the {name} settings"
+        return "neither the old nor the new settings"
 
 
 def default_path() -> Path:

@@ -59,7 +59,7 @@ def setup(
                 return _write(setups, _restoring(setups, backups), Names("former", "restored"))
             for each in setups:
                 if each.joint in backups:
-                    print(f"{each.joint} {backups[each.joint].state(each.values)} of {backup}")
+                    print(f"{each.joint} has {backups[each.joint].state(each.values)} of {backup}")
             changes = {each.joint: each.wanted for each in setups if each.wanted}
             if write and changes:
                 path = backup or default_path()
@@ -128,7 +128,7 @@ def _restoring(setups: Sequence[JointSetup], backups: Mapping[str, Backup]) -> C
             raise CommandError(f"{text} {backup.serial_number or '-'}, not {found.serial_number or '-'}")
         for key in backup.old.keys() - each.values.keys():
             raise CommandError(f"{each.joint}: {key}: {each.unreadable.get(key, 'this drive has no such setting')}")
-        print(f"{each.joint} {backup.state(each.values)}")
+        print(f"{each.joint} had {backup.state(each.values)} until now")
     return {each.joint: backups[each.joint].old for each in setups}
 
 

@@ -47,6 +47,7 @@ def test_different_settings_are_written_backed_up_and_restored(
     assert "left_sweep has the new settings of old.toml" in after
     restored = run("drives", "setup", *config, "--restore", "old.toml")
     assert restored.returncode == exit_codes.OK and "left_sweep: it has the restored settings" in restored.stdout
+    assert "left_sweep had the new settings" in restored.stdout and "has the new" not in restored.stdout
     assert "left_sweep has the old settings" in run("drives", "setup", *config, "--backup", "old.toml").stdout
 
 
