@@ -2,12 +2,16 @@
 
 from pathlib import Path
 
-OPERATORS = "-operators"
+OPERATORS, ROWS = "-operators", "-rows"
 
 
 def operators_path(status_socket: Path) -> Path:
-    return status_socket.with_name(f"{status_socket.stem}{OPERATORS}{status_socket.suffix}")
+    return _next_to(status_socket, OPERATORS)
 
 
 def rows_path(status_socket: Path) -> Path:
-    return status_socket.with_name(f"{status_socket.stem}-rows.sock")
+    return _next_to(status_socket, ROWS)
+
+
+def _next_to(status_socket: Path, added: str) -> Path:
+    return status_socket.with_name(f"{status_socket.stem}{added}{status_socket.suffix}")

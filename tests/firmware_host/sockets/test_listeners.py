@@ -13,7 +13,7 @@ import msgpack
 import pytest
 
 from control.rate import PERIOD_S
-from firmware_host.configuration.socket_paths import operators_path
+from firmware_host.configuration.socket_paths import operators_path, rows_path
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_file import SocketFile
@@ -64,6 +64,11 @@ def test_a_stop_of_any_account_passes_3000_waiting_connections(served: Served, c
     ticks = ticks_until_stopped(served, connect(served, BYSTANDER), stopped)
     assert ticks * PERIOD_S < 0.5
     assert stopped[0].peer == BYSTANDER
+
+
+def test_daemons_whose_sockets_differ_in_their_endings_share_no_socket() -> None:
+    paths = [Path(name) for name in ("m.sock", "m.socket", "m")]
+    assert len({each for path in paths for each in (path, operators_path(path), rows_path(path))}) == 9
 
 
 def test_an_operator_stops_at_once_next_to_3000_waiting_connections(served: Served, crowd: list[socket.socket]) -> None:
