@@ -24,7 +24,8 @@ class Client:
     With `lease_s`, the orders that move the robot take a lease of so many seconds: the robot stops by itself when the
     lease ends, and no other program moves the robot meanwhile. `wait_for` renews the lease, and leaving the `with`
     statement releases it. All methods raise NoDaemonError where no daemon answers, CallRefusedError with the daemon's
-    reason where it refuses an order, and NotPermittedError.
+    reason where it refuses an order, and NotPermittedError. Where the daemon has restarted, the call after that error
+    connects again.
     """
 
     def __init__(self, socket: str | Path | None = None, lease_s: float = 0.0) -> None:

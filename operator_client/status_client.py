@@ -48,23 +48,27 @@ class CallRefusedError(Exception):
 class StatusClient:
     """Connects through the operators' own socket where this user may, else through the one for every user.
 
-    A `with` statement closes it. Raises NoDaemonError and NotPermittedError.
+    A `with` statement closes it. Raises NoDaemonError and NotPermittedError. After a call whose connection the daemon
+    closed, the next call connects again; no request is sent twice.
     """
 
     def __init__(self, path: str | PathLike[str], timeout_s: float = ANSWER_S) -> None:
-        self._path = fspath(path)
-        stem, ending = splitext(self._path)
+        self._path, self._timeout_s = fspath(path), timeout_s
         self._number, self._one_thread = 0, allocate_lock()
-        self._unpacker = msgpack.Unpacker(raw=False)
-        try:
-            self._socket = _connected(f"{stem}{OPERATORS}{ending}", timeout_s)
-        except OSError:
-            self._socket = self._connect_as_anyone(timeout_s)
-        self._socket.settimeout(timeout_s)
+        self._connect()
 
-    def _connect_as_anyone(self, timeout_s: float) -> socket:
+    def _connect(self) -> None:
+        stem, ending = splitext(self._path)
         try:
-            return _connected(self._path, timeout_s)
+            self._socket = _connected(f"{stem}{OPERATORS}{ending}", self._timeout_s)
+        except OSError:
+            self._socket = self._connect_as_anyone()
+        self._socket.settimeout(self._timeout_s)
+        self._unpacker, self._is_lost = msgpack.Unpacker(raw=False), False
+
+    def _connect_as_anyone(self) -> socket:
+        try:
+            return _connected(self._path, self._timeout_s)
         except PermissionError as problem:
             why = f"no permission to use {self._path}: its folder lets only its owner in"
             raise NotPermittedError(why) from problem
@@ -101,11 +105,16 @@ class StatusClient:
         if len(request) > LONGEST_REQUEST:
             name = max(params, key=lambda key: len(str(params[key])))
             raise CallRefusedError(f"{name} = {params[name]!r:.40}... is too long: {TOO_LONG}")
+        if self._is_lost and self._socket.fileno() >= 0:
+            lost = self._socket
+            self._connect()
+            lost.close()
         try:
             with suppress(ConnectionError):  # what it said before it closed the connection can still be read
                 self._socket.sendall(request)
             return self._receive()
         except ConnectionError as problem_reading:
+            self._is_lost = True
             raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading
         except OSError as problem_reading:
             silent = f"the daemon on {self._path} does not answer: {SILENT}"

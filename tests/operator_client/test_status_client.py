@@ -130,6 +130,28 @@ def test_a_connection_that_the_daemon_closed_is_reported(ends: Ends, before: int
         client.call("status")
 
 
+def test_after_a_restart_of_the_daemon_the_next_call_connects_again_and_no_request_is_repeated(
+    ends: Ends, short_folder: Path
+) -> None:
+    client, connection = ends
+    connection.close()
+    with pytest.raises(DroppedError):
+        client.call("walk")
+    (short_folder / "s").unlink()
+    with pytest.raises(NoDaemonError, match="no daemon answers"):
+        client.call("walk")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(short_folder / "s"))
+        listener.listen()
+        with ThreadPoolExecutor() as threads:
+            answered = threads.submit(client.call, "status")
+            again, _ = listener.accept()
+            with again:
+                _, number, method, _ = msgpack.unpackb(again.recv(4096))
+                again.sendall(msgpack.packb([rpc.RESPONSE, number, None, method]))
+                assert answered.result() == "status"
+
+
 def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
     client, connection = ends
     connection.sendall(msgpack.packb([rpc.RESPONSE, None, f"{rpc.NOT_PERMITTED}join", None]))
