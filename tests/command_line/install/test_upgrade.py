@@ -136,13 +136,22 @@ def test_a_computer_without_a_configuration_has_none_to_refuse(computer: Compute
     assert computer.upgrade() == exit_codes.OK and computer.installed
 
 
-@pytest.mark.parametrize("mode", ["", *(mode.name.lower() for mode in Mode)])
-def test_the_package_refuses_in_the_same_modes(mode: str, tmp_path: Path) -> None:
-    """The scripts of the package also protect an upgrade by apt or dpkg alone; a broken program prevents none."""
+@pytest.mark.parametrize(
+    ("mode", "options"),
+    [("", ""), *((mode.name.lower(), "") for mode in Mode), ("hold", "--config {}"), ("hold", "--config={}")],
+)
+def test_the_package_refuses_in_the_same_modes(mode: str, options: str, tmp_path: Path) -> None:
+    """The scripts of the package also protect an upgrade by apt or dpkg alone; a broken program prevents none.
+
+    The unit, or a drop-in of it, names the configuration; no unit is active here.
+    """
+    configuration = tmp_path / ("other.toml" if options else "mudskipper.toml")
+    unit = f"ExecStart={{ path=/x/mudskipperd ; argv[]=/x/mudskipperd {options.format(configuration)} ; pid=0 }}"
     answers = f"test $MUDSKIPPER_SOCKET = own.sock && echo '{json.dumps({'mode': mode})}'"
     answer = f"#!/bin/sh\n{answers}" if mode else "#!/none"
-    (tmp_path / "mudskipper.toml").write_text('[status]\nsocket = "own.sock"\n', encoding="utf-8")
-    for name, text in (("mudskipper", answer), ("systemctl", "#!/bin/sh\nexit 3")):  # no service is active
+    configuration.write_text('[status]\nsocket = "own.sock"\n', encoding="utf-8")
+    systemctl = f"#!/bin/sh\ntest $1 = show && echo '{unit}'"
+    for name, text in (("mudskipper", answer), ("systemctl", systemctl)):
         (tmp_path / name).write_text(text, encoding="utf-8")
         (tmp_path / name).chmod(0o755)
     path = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
