@@ -44,7 +44,7 @@ class MudLayout(NamedTuple):
 
     def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
         """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
-        rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
+        rear_m, front_m = plates_m - max(0.0, slip_m) - BORDER_M, plates_m - min(0.0, slip_m) + BORDER_M
         if not plates_m < self.ends_m[-1] or any(rear_m < border_m < front_m for border_m in self.ends_m[:-1]):
             return ""
         return self.names[sum(plates_m >= border_m for border_m in self.ends_m[:-1])]

@@ -6,7 +6,7 @@ and are listed in `missing`.
 """
 
 from collections.abc import Mapping, Sequence
-from math import nan, radians, sin
+from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,7 +55,6 @@ class RecordedWalk(NamedTuple):
 
     title: str
     geometry: FlipperGeometry
-    sweep_rad: float  # commanded, at the front and at the rear
     flipper: str
     time_s: Floats
     phase: NDArray[np.int64]  # commanded
@@ -81,11 +80,6 @@ class RecordedWalk(NamedTuple):
     def sides(self) -> list["RecordedWalk"]:
         """The same walk with each flipper as the one that is shown."""
         return [self._replace(flipper=flipper, **series) for flipper, series in self.series.items()] or [self]
-
-    @property
-    def reach_m(self) -> float:
-        """How far in front of the body the plates go down: l sin α."""
-        return self.geometry.flipper_length_m * sin(self.sweep_rad)
 
     @property
     def own_strides(self) -> list[dict[str, Any]]:
@@ -140,7 +134,6 @@ def walk_of_trace(log: AnyLog, configuration: Configuration, traces: WalkTraces,
     return RecordedWalk(
         title=f"{summary['robot']}  {summary['started']}",
         geometry=configuration.geometry,
-        sweep_rad=radians(configuration.gait.sweep_angle_deg),
         **_columns_of(trace.rows, trace.start_s, log.rig, log.rig.flippers[-1]),
         strides=[_since(trace.start_s, stride) for stride in strides],
         noticed_s=[event["stamp_s"] - trace.start_s for event in events if event["text"] == ANOTHER_MUD],
@@ -235,7 +228,6 @@ def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
     return RecordedWalk(
         title=path.name,
         geometry=FlipperGeometry(),
-        sweep_rad=lab.gait.get("lateral_angle_range", radians(lab.gait.get("sweep_angle_deg", nan))),
         flipper=lab.flippers[-1],
         **series[lab.flippers[-1]],
         time_s=lab.stamp_s - start_s,

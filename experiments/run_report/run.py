@@ -8,7 +8,7 @@ the robot noticed, described by its k_p.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, isfinite, isnan, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -152,9 +152,8 @@ def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk])
     if layout is None or not walks:
         return layout
     known = np.concatenate([walk.body_x_m[np.isfinite(walk.body_x_m)] for walk in walks])
-    missing = "position of the body" if not len(known) else "sweep angle in its head" if isnan(walks[0].reach_m) else ""
-    if missing and len(layout.names) > 1:
-        raise LogError(f"{path}: has no {missing}, so its strides cannot be assigned to muds: name one mud")
+    if not len(known) and len(layout.names) > 1:
+        raise LogError(f"{path}: has no position of the body, so its strides cannot be assigned to muds: name one mud")
     return layout.beginning_at(float(known[0])) if len(known) else layout
 
 
@@ -217,10 +216,22 @@ def estimate_frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
 def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudRegion], row: Stride) -> str:
     if layout is None:
         return next((each.name for each in reversed(regions) if each.start_s <= row["t_start_s"]), "")
-    if len(layout.names) == 1 and not isfinite(row["position_m"] + walk.reach_m):
+    plates_m, slip_m = _plates_m(walk, row)
+    if len(layout.names) == 1 and not isfinite(plates_m):
         return mud_label(layout.names[0])
-    slip_m = max(0.0, 2.0 * walk.reach_m - row["step_m"])
-    return mud_label(layout.mud_at(row["position_m"] + walk.reach_m, slip_m))
+    return mud_label(layout.mud_at(plates_m, slip_m))
+
+
+def _plates_m(walk: RecordedWalk, row: Stride) -> tuple[float, float]:
+    """Return where the plates go down, and how far they slip to the rear; negative in a walk backward."""
+    sweep_rad = walk.series[FLIPPERS[row["flipper"]]]["sweep_angle_rad"]
+    times_s = [row["t_start_s"], row["t_start_s"] + row["insertion_s"], row["stamp_s"]]
+    begin, down, close = np.searchsorted(walk.time_s, times_s).clip(max=len(walk.time_s) - 1)
+    ahead_m = walk.geometry.flipper_length_m * np.sin(sweep_rad)
+    swept_m = ahead_m[begin] - ahead_m[begin : close + 1]
+    full_m = float(swept_m[np.argmax(np.abs(swept_m))])
+    slip_m = full_m - row["step_m"]
+    return row["position_m"] + float(ahead_m[down]), max(0.0, slip_m) if full_m > 0.0 else min(0.0, slip_m)
 
 
 def estimate_of_row(row: Stride, name: str) -> dict[str, Any]:

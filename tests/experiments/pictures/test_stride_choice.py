@@ -1,6 +1,6 @@
 """The strides and moments to be shown are chosen correctly from walks that are synthesised row by row."""
 
-from math import nan, radians
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,6 @@ def walk_of(strides: list[dict[str, Any]], direction: float = 1.0) -> RecordedWa
     return RecordedWalk(
         title="made up",
         geometry=FlipperGeometry(),
-        sweep_rad=radians(30.0),
         flipper="right",
         time_s=np.arange(len(phases), dtype=np.float64) / 10.0,
         phase=np.array(phases, dtype=np.int64),

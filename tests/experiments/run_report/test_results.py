@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from math import hypot, nan, sqrt
+from math import copysign, hypot, inf, nan, sqrt
 from pathlib import Path
 from statistics import fmean
 from types import SimpleNamespace
@@ -18,7 +18,7 @@ from control.modes import Mode
 from control.records import Phase
 from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
-from experiments.pictures.mud_layout import UNMEASURED, layout_of_lengths
+from experiments.pictures.mud_layout import UNMEASURED, MudLayout, layout_of_lengths
 from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
@@ -31,7 +31,7 @@ from experiments.run_report.results import (
     speed_of,
     travel_of,
 )
-from experiments.run_report.run import Run, _placed, _trials_in, read_runs
+from experiments.run_report.run import Run, _mud_of, _placed, _trials_in, read_runs
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.trial import BEGUN, OperatorReport
 from logs.fault_history import LoggedCause
@@ -65,7 +65,7 @@ def test_distance_time_and_strides_are_those_of_the_simulated_robot(walked: tupl
 def test_each_stride_is_in_the_mud_in_which_the_plates_go_down(walked: tuple[Run, float]) -> None:
     """The true borders are the reference; a stride near a border belongs to no mud."""
     run, _ = walked
-    reach_m = run.walks[0].reach_m
+    reach_m = 0.06  # 12 cm at 30°
     muds = {"w = 48.5 %": (-1.0, 0.61), "w = 53.1 %": (0.61, 1.22)}
     named = run.strides[run.strides["mud"] != ""]
     assert 5 <= len(named) <= 7 and set(named["mud"]) == set(muds)
@@ -186,12 +186,28 @@ def test_the_rest_before_and_after_the_gait_of_a_csv_is_no_walking() -> None:
     assert travel_of([walk], in_gait=True)["speed_m_s"] == pytest.approx(0.03)
 
 
-def test_several_muds_need_the_reach_of_the_plates_which_a_csv_without_settings_does_not_have() -> None:
-    walk: Any = SimpleNamespace(body_x_m=np.array([0.1]), reach_m=nan)
+def test_several_muds_need_the_position_of_the_body() -> None:
+    walk: Any = SimpleNamespace(body_x_m=np.array([nan]))
     two, one = ([("A", 0.6), ("B", 0.6)], [("A", 0.6)])
-    with pytest.raises(LogError, match="has no sweep angle in its head.*name one mud"):
+    with pytest.raises(LogError, match="has no position of the body.*name one mud"):
         _placed(Path("walk.csv"), layout_of_lengths(two), [walk])
     assert _placed(Path("walk.csv"), layout_of_lengths(one), [walk]) is not None
+
+
+@pytest.mark.parametrize("sweep_deg", [30.0, -30.0])
+def test_the_plates_of_a_walk_backward_go_down_behind_the_body_and_slip_forward(sweep_deg: float) -> None:
+    """They go down 6 cm from the body, and slip by 5 of 12 cm, which a border 4 cm from there lets be in either mud."""
+    ahead, sweep_rad = copysign(1.0, sweep_deg), np.radians([sweep_deg, sweep_deg, -sweep_deg])
+    series = {"left": {"sweep_angle_rad": sweep_rad}}
+    walk: Any = SimpleNamespace(geometry=FlipperGeometry(), time_s=np.arange(3.0), series=series)
+    times = {"t_start_s": 0.0, "insertion_s": 1.0, "stamp_s": 2.0}
+    row = times | {"flipper": 0, "position_m": 0.0, "step_m": 0.07 * ahead}
+    muds = [
+        _mud_of(walk, MudLayout(("rear", "front"), (border_m * ahead, inf)), (), row)
+        for border_m in (0.10, 0.02, -0.03, 0.0)
+    ]
+    before, beyond = ("rear", "front")[:: int(ahead)]
+    assert muds == [before, "", beyond, ""]
 
 
 @pytest.mark.parametrize(("depths_m", "alike"), [([0.031, 0.034], True), ([0.02, 0.03, 0.042], False), ([nan], False)])
