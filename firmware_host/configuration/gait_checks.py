@@ -2,9 +2,10 @@
 
 Each problem is one message with file, phase, key, value and bound. The currents are those that the forecast of depths
 expects (control/depth/forecast.py): k_p Φ on the way down, half of k_e Φ, the peak of an extraction, on the way up; and
-backward or forward k_s Ψ, or what moves the body against its drag if that is less. Where no mud is known, the paper's
-of 49.5 % water is expected. A phase ends where its force reaches `until_force_n`, and the stride goes on from there.
-The acceleration of body and arms is not in it: it lasts tens of milliseconds.
+backward or forward k_s Ψ, or what moves a body against its drag if that is less, also on a fixed base, where a sweep at
+its limit lags behind. Where no mud is known, the paper's of 49.5 % water is expected. A phase ends where its force
+reaches `until_force_n`, and the stride goes on from there. The acceleration of body and arms is not in it: it lasts
+tens of milliseconds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -197,7 +198,9 @@ def _current_problems(path: GaitPath, configuration: Configuration, depth_m: flo
     for number, pose, torques_nm in _loaded_poses(path, configuration, depth_m, mud):
         for axis, torque_nm, constant_nm_a in zip(("sweep", "adduction"), torques_nm, constants_nm_a, strict=True):
             if torque_nm > largest_nm:
-                taken = f"the expected mud takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor"
+                name = "k_s" if axis == "sweep" else "k_p" if pose.sunk_m_s > 0.0 else "k_e"
+                expected = "the mud of the walk before" if getattr(mud, name) else "mud of 49.5 % water"
+                taken = f"{expected} takes {torque_nm / constant_nm_a:.1f} A of the {axis} motor"
                 most = f"{largest_nm / constant_nm_a:.1f} A ({largest_nm:.2f} N·m); a smaller depth takes less"
                 found.setdefault(number, f"{_phase_key(path, number)}.{_where(pose)}: {taken}, must be at most {most}")
     yield from found.values()

@@ -126,8 +126,7 @@ def test_mud_that_is_known_to_hold_the_flippers_too_hard_is_refused(configuratio
     firm = Coefficient(8e6, 1e5, 1e5, 0.03, -0.5, 0.1, 3)
     path = read_gait({"name": "mine.toml", "phase": stroke()})
     (known,) = gait_problems(path, configuration, [0.03], NOTHING_KNOWN._replace(k_e=firm))
-    assert known.startswith("mine.toml: phase 3 (extraction)")
-    assert " A " in known
+    assert known.startswith("mine.toml: phase 3 (extraction)") and "the mud of the walk before takes" in known
 
 
 def test_a_phase_takes_no_more_current_than_the_force_that_ends_it(configuration: Configuration) -> None:
