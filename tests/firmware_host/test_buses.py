@@ -14,10 +14,9 @@ import pytest
 
 from control.modes import Mode, Request
 from drivers.can.bus_lock import BusRole
-from drivers.can.mock_bus import MockPort
+from drivers.can.mock_bus import MockBus, MockPort
 from drivers.can.port_health import BusState
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
-from drivers.drives import Drives
 from firmware_host import buses
 from firmware_host.buses import BusError, lock_buses, open_bus, open_ports, reopening_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
@@ -25,13 +24,10 @@ from firmware_host.configuration.loading import load_configuration
 from firmware_host.daemon import reopen_buses
 from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
+from tests.firmware_host.recorded_robot import RecordedRobot
 from tests.waiting import LONGEST_S
 
 CAN0 = BusParameters("socketcan", "can0")
-TICKS_A_SECOND = 380
 
 
 def refuse_with(problem: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,26 +65,18 @@ def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
     assert "\n" not in str(caught.value)
 
 
-class Opened:
-    def __init__(self) -> None:
-        self.closed = False
-
-    def close(self) -> None:
-        self.closed = True
-
-
 def test_when_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = Opened()
+    first = MockBus()
 
-    def open_left_alone(interface: str, channel: str, options: object, fd: bool) -> Opened:
+    def open_left_alone(interface: str, channel: str, options: object, fd: bool) -> MockPort:
         if channel == "can1":
             raise OSError(errno.ENODEV, "No such device")
-        return first
+        return first.open()
 
     monkeypatch.setattr(buses, "open_port", open_left_alone)
     with pytest.raises(BusError, match="bus.right"):
         open_ports({"left": CAN0, "right": BusParameters("socketcan", "can1")})
-    assert first.closed
+    assert first.ports == []
 
 
 def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,92 +89,55 @@ def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypat
 
 
 class Plug:
-    """Unplugs the left adapter of a robot in lockstep and plugs it in again."""
+    """A bus of a robot in lockstep, from which the loop's adapter can be unplugged."""
 
-    def __init__(self, robot: Lockstep) -> None:
-        drives = robot.loop.drives
-        assert isinstance(drives, Drives)
-        wire = drives.ports["left"]
-        assert isinstance(wire, MockPort)
-        self.inside = True
-        self.port = ReopeningPort(lambda: self._open(wire), wait=True)
-        self.wire = wire
-        drives.ports["left"] = self.port
-        for monitor in robot.loop.fault_monitor._buses:
-            if monitor._port is wire:
-                monitor._port = self.port
-        for index, (port, receivers) in enumerate(drives._receivers):
-            if port is wire:
-                drives._receivers[index] = (self.port, receivers)
-        for outlet in drives.gate._outlets:
-            if outlet._port is wire:
-                outlet._port = self.port
+    def __init__(self) -> None:
+        self._bus, self._inside = MockBus(), True
+        self.adapter = ReopeningPort(self._plug_in, wait=True)
+        self._ends = iter((self._bus.open(), self.adapter))  # the robot opens the first one
 
-    def _open(self, wire: MockPort) -> MockPort:
-        if not self.inside:
+    def open(self) -> MockPort | ReopeningPort:
+        return next(self._ends)
+
+    def _plug_in(self) -> MockPort:
+        if not self._inside:
             raise NotOpenError("bus.left (socketcan can0) does not open: there is no such interface")
-        wire.state = BusState.ACTIVE
-        wire.queue.clear()
-        return wire
+        self._wire = self._bus.open()
+        return self._wire
 
     def pull(self) -> None:
-        self.inside = False
-        self.wire.state, self.wire.last_error = BusState.OFF, "No such device"
-        self.wire.close = lambda: None  # type: ignore[method-assign]
-        self.wire.receive = list  # type: ignore[method-assign]
+        self._inside = False
+        self._wire.state, self._wire.last_error, self._wire.full = BusState.OFF, "No such device", True
+        self._wire.close()
 
-    def plug_in(self) -> None:
-        self.inside = True
-        del self.wire.receive
-
-    def run(self, robot: Lockstep, for_s: float) -> None:
-        for _ in range(int(for_s * TICKS_A_SECOND)):
-            robot.step()
-            reopen_buses(robot.loop, {"left": self.port}, robot.now_s)
+    def put_back(self) -> None:
+        self._inside = True
 
 
-def mode_of(robot: Lockstep) -> Mode:
+def mode_of(robot: RecordedRobot) -> Mode:
     return robot.loop.mode
 
 
-@pytest.fixture
-def robot(configuration: Configuration) -> Lockstep:
-    return Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
-
-
 def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_returns(
-    robot: Lockstep,
+    configuration: Configuration,
 ) -> None:
-    plug = Plug(robot)
+    plug = Plug()
+    robot = RecordedRobot(configuration, buses={"left": plug, "right": MockBus()})
+    robot.late_acts.append(lambda: reopen_buses(robot.loop, {"left": plug.adapter}, robot.now_s))
     robot.arm()
     plug.pull()
-    plug.run(robot, 2.5)
+    robot.run_for(2.5)
     assert mode_of(robot) is Mode.FAULT
     names = {fault.name: fault.message for fault in robot.loop.faults.present}
     assert "there is no such interface" in names["bus_off"]
-    plug.plug_in()
-    plug.run(robot, 2.0 * RETRY_S)
-    assert plug.port.state is BusState.ACTIVE
+    plug.put_back()
+    robot.run_for(2.0 * RETRY_S)
+    assert plug.adapter.state is BusState.ACTIVE
     assert mode_of(robot) is Mode.FAULT  # until an operator clears it
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
-    plug.run(robot, 2.0)
+    robot.run_for(2.0)
     assert mode_of(robot) is Mode.IDLE
     assert not any(state.closed_loop for state in robot.loop.states)
-
-
-def test_no_bus_is_opened_while_torque_is_on(robot: Lockstep) -> None:
-    plug = Plug(robot)
-    robot.arm()
-    tried: list[float] = []
-
-    def try_it(now_s: float) -> bool:
-        tried.append(now_s)
-        return False
-
-    plug.port.reopen = try_it  # type: ignore[method-assign]
-    plug.run(robot, 0.5)
-    assert robot.loop.mode is Mode.HOLD
-    assert tried == []
 
 
 def test_a_daemon_without_its_bus_waits_if_configured(short_folder: Path, tmp_path: Path) -> None:

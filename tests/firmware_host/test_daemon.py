@@ -9,46 +9,38 @@ from pathlib import Path
 import pytest
 
 from control.controller import WalkOrder
-from control.modes import Mode, Request
+from control.modes import ENERGISED, Mode, Request
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockPort
-from drivers.odrive.codec import SET_AXIS_STATE
+from drivers.pose.pose_port import NoPose
 from firmware_host.computer.sd_notify import SystemdNotifier
-from firmware_host.configuration.configuration import Configuration
-from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
+from firmware_host.daemon import (
+    EXIT_FAILED,
+    NOTIFY_TICKS,
+    Shutdown,
+    WatchdogFeed,
+    end_safely,
+    reopen_buses,
+    reopen_pose,
+    serve,
+)
 from firmware_host.log.log_folder import DONE
 from firmware_host.sockets.status_socket import MOST_OPERATORS
 from firmware_host.ticker import Tick
 from logs.files.log_reader import read_log
 from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
+from tests.firmware_host.recorded_robot import RecordedRobot
 from tests.firmware_host.sockets.served_socket import Served
 from tests.waiting import LONGEST_S, wait_until
 
-FIRM = Track([(5.0, MUDS["48.5"])])
 
-
-@pytest.fixture
-def robot(configuration: Configuration) -> Lockstep:
-    robot = Lockstep(configuration, FIRM)
-    robot.arm()
-    return robot
-
-
-def run_shutdown(robot: Lockstep, shutdown: Shutdown, longest_s: float = 8.0) -> bool:
+def run_shutdown(robot: RecordedRobot, shutdown: Shutdown, longest_s: float = 8.0) -> bool:
     return robot.run_until(lambda: shutdown.step(robot.loop, robot.now_s), longest_s)
-
-
-def energised(robot: Lockstep) -> list[bool]:
-    return [drive.energised for drive in robot.robot.drives]
 
 
 @pytest.mark.parametrize("walked_s", [0.01, 1.7, 2.5])
 def test_a_signal_in_a_walk_raises_the_flippers_from_the_second_tick_on_and_idles_the_drives(
-    robot: Lockstep, walked_s: float
+    robot: RecordedRobot, walked_s: float
 ) -> None:
     robot.walk(WalkOrder(0.03))
     robot.run_for(walked_s)
@@ -59,35 +51,20 @@ def test_a_signal_in_a_walk_raises_the_flippers_from_the_second_tick_on_and_idle
         robot.step()
     assert robot.loop.mode is Mode.STOPPING
     assert run_shutdown(robot, shutdown)
-    assert energised(robot) == [False] * 4
+    assert robot.energised == [False] * 4
     assert robot.loop.events.notice == ""  # a notice would report flippers in the mud
 
 
-def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: Lockstep) -> None:
-    lose_first_idle_requests(robot, ["left", "right"], lost=3)
+def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: RecordedRobot) -> None:
+    robot.fail("left_sweep.command", "off", 0.05)
     shutdown = Shutdown()
     shutdown.request(15, None)
+    assert not run_shutdown(robot, shutdown, 0.05) and robot.energised == [True, False, False, False]
     assert run_shutdown(robot, shutdown)
-    assert energised(robot) == [False] * 4
+    assert robot.energised == [False] * 4
 
 
-def lose_first_idle_requests(robot: Lockstep, buses: list[str], lost: int) -> None:
-    left = [lost]
-    for bus in buses:
-        port = robot.loop.drives.ports[bus]
-        assert isinstance(port, MockPort)
-        send = port.send
-
-        def lossy(frame: Frame, send: object = send) -> None:
-            if frame.arbitration_id & 0x1F == SET_AXIS_STATE.command and left[0] > 0:
-                left[0] -= 1
-            else:
-                send(frame)  # type: ignore[operator]
-
-        port.send = lossy  # type: ignore[method-assign]
-
-
-def test_nothing_is_armed_while_the_daemon_ends(robot: Lockstep) -> None:
+def test_nothing_is_armed_while_the_daemon_ends(robot: RecordedRobot) -> None:
     shutdown = Shutdown()
     shutdown.request(15, None)
     shutdown.step(robot.loop, robot.now_s)
@@ -103,30 +80,45 @@ def a_bug() -> Exception:
         return problem
 
 
-def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pytest.CaptureFixture[str]) -> None:
-    port = robot.loop.drives.ports["left"]
-    assert isinstance(port, MockPort)
-
+def test_a_bug_idles_all_drives_that_can_be_reached(robot: RecordedRobot, capsys: pytest.CaptureFixture[str]) -> None:
     def broken(frame: Frame) -> None:
         raise OSError("the adapter was unplugged")
 
-    port.send = broken  # type: ignore[method-assign]
+    robot.loop.drives.ports["left"].send = broken  # type: ignore[method-assign]
     assert end_safely(robot.loop, a_bug()) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
-    assert energised(robot)[2:] == [False] * 2
+    assert robot.energised[2:] == [False] * 2
     said = capsys.readouterr().err
     assert "ZeroDivisionError: somewhere in a tick (test_daemon.py, line" in said
     assert "Traceback" not in said
 
 
-def test_a_bug_in_the_log_does_not_prevent_idling_the_drives(robot: Lockstep) -> None:
+def test_a_bug_in_the_log_does_not_prevent_idling_the_drives(robot: RecordedRobot) -> None:
     def broken(number: int, row: bytes) -> bool:
         raise ZeroDivisionError
 
     robot.loop.recorder.put = broken  # type: ignore[method-assign]
     assert end_safely(robot.loop, a_bug()) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
-    assert energised(robot) == [False] * 4
+    assert robot.energised == [False] * 4
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_buses_and_the_pose_source_are_opened_again_only_while_the_torque_is_off(
+    robot: RecordedRobot, mode: Mode
+) -> None:
+    tried: list[float] = []
+
+    class Lost(NoPose):
+        def reopen(self, now_s: float) -> bool:
+            tried.append(now_s)
+            return True
+
+    robot.loop.mode = mode
+    reopen_buses(robot.loop, {"left": Lost()}, 1.0)  # type: ignore[dict-item]
+    reopen_pose(robot.loop, Lost(), 2.0)
+    assert tried == ([] if mode in ENERGISED else [1.0, 2.0])
+    assert len(robot.recorder.about("opened again")) == len(tried)
 
 
 class Notices(SystemdNotifier):
@@ -148,7 +140,7 @@ def test_a_loop_that_misses_most_ticks_does_not_feed_the_watchdog(missed: int, f
 
 
 def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
-    robot: Lockstep, short_folder: Path, monkeypatch: pytest.MonkeyPatch
+    robot: RecordedRobot, short_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     served = Served(short_folder / "s")
     monkeypatch.setattr("firmware_host.daemon.time.monotonic", iter((1.0, 1.002)).__next__)

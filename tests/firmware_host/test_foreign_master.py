@@ -7,7 +7,6 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from drivers.can.frames import Frame
-from drivers.fault_injection.failures import Failures
 from drivers.odrive.codec import (
     ADDRESS,
     CLEAR_ERRORS,
@@ -22,17 +21,10 @@ from drivers.odrive.codec import (
     arbitration_id,
 )
 from firmware_host.configuration.configuration import Configuration
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
 from tests.copied_robots import copy_of
+from tests.firmware_host.recorded_robot import RecordedRobot
 
-TRACK = Track([(5.0, MUDS["48.5"])])
 SERIAL = "385f324d3037"
-
-
-def present(robot: Lockstep) -> set[str]:
-    return {fault.name for fault in robot.loop.faults.present}
 
 
 def with_serial_number(configuration: Configuration, serial_number: str) -> Configuration:
@@ -42,27 +34,19 @@ def with_serial_number(configuration: Configuration, serial_number: str) -> Conf
 
 
 @pytest.fixture(scope="module")
-def armed(configuration: Configuration) -> Lockstep:
-    robot = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
-    robot.arm()
-    robot.run_for(0.5)
-    return robot
-
-
-@pytest.fixture(scope="module")
-def walking(armed: Lockstep) -> Lockstep:
-    robot = copy_of(armed)
+def walking(armed_robot: RecordedRobot) -> RecordedRobot:
+    robot = copy_of(armed_robot)
     robot.walk(WalkOrder(0.03, adaptive=False))
     robot.run_for(1.0)
     return robot
 
 
 @pytest.mark.parametrize("kind", ["slow", "intermittent"])
-def test_commands_that_come_late_or_by_halves_idle_the_drives(walking: Lockstep, kind: str) -> None:
+def test_commands_that_come_late_or_by_halves_idle_the_drives(walking: RecordedRobot, kind: str) -> None:
     robot = copy_of(walking)
     robot.fail("left_adduction.command", kind, 2.0)
     assert robot.run_until(lambda: robot.loop.mode not in ENERGISED, 1.0)
-    assert "setpoint_mismatch" in present(robot)
+    assert "setpoint_mismatch" in robot.fault_names
 
 
 COMMANDS: list[tuple[Message, bytes, bool]] = [
@@ -79,23 +63,22 @@ COMMANDS: list[tuple[Message, bytes, bool]] = [
 
 @pytest.mark.parametrize(("message", "data", "counts"), COMMANDS)
 def test_every_command_counts_but_a_stop_and_a_reading(
-    armed: Lockstep, message: Message, data: bytes, counts: bool
+    robot: RecordedRobot, message: Message, data: bytes, counts: bool
 ) -> None:
-    robot = copy_of(armed)
-    robot.buses["left"].open().send(Frame(arbitration_id(1, message), data))
+    robot.send_foreign("left_sweep", Frame(arbitration_id(1, message), data))
     robot.step()
-    assert ("foreign_commands" in present(robot)) == counts
+    assert ("foreign_commands" in robot.fault_names) == counts
 
 
 def test_the_right_drive_arms(configuration: Configuration) -> None:
-    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    robot = RecordedRobot(with_serial_number(configuration, SERIAL))
     robot.arm()
     assert robot.loop.mode is Mode.HOLD
 
 
 @pytest.mark.parametrize("answers", [True, False])
 def test_another_drive_or_one_that_does_not_answer_does_not_arm(configuration: Configuration, answers: bool) -> None:
-    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    robot = RecordedRobot(with_serial_number(configuration, SERIAL))
     drive = robot.robot.drives[0]
     drive.parameters = replace(drive.parameters, serial_number="000000000001")
     if not answers:
@@ -104,12 +87,12 @@ def test_another_drive_or_one_that_does_not_answer_does_not_arm(configuration: C
             [] if frame.is_remote and frame.arbitration_id & 0x1F == ADDRESS.command else receive(frame, now_s)
         )
     robot.run_for(2.0)
-    assert present(robot) == {"wrong_drive"}
+    assert robot.fault_names == {"wrong_drive"}
     assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown")
 
 
 def test_a_serial_number_is_asked_for_only_of_firmware_that_knows_it(configuration: Configuration) -> None:
-    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    robot = RecordedRobot(with_serial_number(configuration, SERIAL))
     port, drive = robot.buses["left"].open(), robot.robot.drives[0]
     receive = drive.receive
     drive.receive = lambda frame, now_s: (  # type: ignore[method-assign]

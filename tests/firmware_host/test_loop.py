@@ -17,36 +17,20 @@ from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError
-from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.harness.drive_presets import calibrated
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS, Clay
+from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
-from tests.recorded_events import EventRecorder
+from tests.firmware_host.recorded_robot import RecordedRobot
 
-FIRM = Track([(5.0, MUDS["48.5"])])
 WALKED_S = (0.0, 0.3, 0.9, 1.5, 1.7, 1.9, 2.1, 2.6)
 
 
 @pytest.fixture(scope="module")
-def armed(configuration: Configuration) -> Lockstep:
-    robot = Lockstep(configuration, FIRM, recorder=EventRecorder())
-    robot.arm()
-    return robot
-
-
-@pytest.fixture
-def robot(armed: Lockstep) -> Lockstep:
-    """Return a robot that holds its pose."""
-    return copy_of(armed)
-
-
-@pytest.fixture(scope="module")
-def walked(armed: Lockstep) -> dict[float, Lockstep]:
+def walked(armed_robot: RecordedRobot) -> dict[float, RecordedRobot]:
     """Return copies of one robot in every phase, by the time since the request to walk."""
-    robot, found = copy_of(armed), {}
+    robot, found = copy_of(armed_robot), {}
     robot.walk(WalkOrder(0.03))
     for before_s, after_s in pairwise((0.0, *WALKED_S)):
         robot.run_for(after_s - before_s)
@@ -54,37 +38,23 @@ def walked(armed: Lockstep) -> dict[float, Lockstep]:
     return found
 
 
-def recorder_of(robot: Lockstep) -> EventRecorder:
-    recorder = robot.loop.recorder
-    assert isinstance(recorder, EventRecorder)
-    return recorder
-
-
-def open_peer(robot: Lockstep, bus: str) -> MockPort:
-    port = robot.loop.drives.ports[bus]
-    assert isinstance(port, MockPort)
-    return port._bus.open()
-
-
-def energised_drives(robot: Lockstep) -> list[SimulatedDrive]:
-    return [drive for drive in robot.robot.drives if drive.energised]
-
-
 def torque_frames(port: MockPort) -> list[Frame]:
     return [frame for frame in port.receive() if frame.arbitration_id & 0x1F == SET_INPUT_TORQUE.command]
 
 
 def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
-    listener = open_peer(robot, "left")
+    robot = RecordedRobot(configuration)
+    listeners = [bus.open() for bus in robot.buses.values()]
     robot.robot.advance = lambda until_s: None  # type: ignore[method-assign] # drives without power
     robot.run_for(1.0)
+    assert robot.loop.request(Request.CLEAR, robot.now_s) is not None
+    robot.step()
     assert robot.loop.mode is Mode.BOOT
-    assert listener.receive() == []
+    assert [listener.receive() for listener in listeners] == [[], []]
 
 
 def test_arming_holds_the_pose_it_finds_without_a_jerk(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
+    robot = RecordedRobot(configuration)
     robot.run_for(0.5)
     before = robot.robot.plant.angles_rad
     robot.arm()
@@ -98,7 +68,7 @@ def test_arming_holds_the_pose_it_finds_without_a_jerk(configuration: Configurat
 
 
 @pytest.mark.parametrize("walked_s", WALKED_S[2:])
-def test_stop_raises_the_flippers_from_any_phase(walked: dict[float, Lockstep], walked_s: float) -> None:
+def test_stop_raises_the_flippers_from_any_phase(walked: dict[float, RecordedRobot], walked_s: float) -> None:
     robot = copy_of(walked[walked_s])
     robot.loop.request(Request.STOP, robot.now_s)
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0)
@@ -107,60 +77,46 @@ def test_stop_raises_the_flippers_from_any_phase(walked: dict[float, Lockstep], 
 
 
 @pytest.mark.parametrize("walked_s", WALKED_S)
-def test_disarm_ends_torque_at_once_in_every_phase(walked: dict[float, Lockstep], walked_s: float) -> None:
+def test_disarm_ends_torque_at_once_in_every_phase(walked: dict[float, RecordedRobot], walked_s: float) -> None:
     robot = copy_of(walked[walked_s])
     robot.loop.request(Request.DISARM, robot.now_s)
     robot.step()
     assert robot.loop.mode is Mode.IDLE
     assert robot.loop.sent.torques_nm == NO_TORQUE
     robot.run_for(0.02)
-    assert not energised_drives(robot)
+    assert not any(robot.energised)
 
 
-def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configuration) -> None:
+@pytest.mark.parametrize(("is_asked", "within_s"), [(True, 0.01), (False, 0.18)])
+def test_a_drive_that_runs_is_idled_before_all_are_heard_and_at_once_on_request(
+    configuration: Configuration, is_asked: bool, within_s: float
+) -> None:
     """This happens if the daemon restarts while one motor runs and another drive is dead."""
-    robot = Lockstep(configuration, FIRM)
+    robot = RecordedRobot(configuration)
     running = robot.robot.drives[0]
     running.energised = True
     robot.robot.drives = same_for_all(running)
     robot.run_for(0.02)
     assert robot.loop.mode is Mode.BOOT
-    assert robot.loop.request(Request.DISARM, robot.now_s) is None
-    robot.run_for(0.01)
-    assert not running.energised
+    if is_asked:
+        assert robot.loop.request(Request.DISARM, robot.now_s) is None
+    robot.run_for(within_s)
+    assert robot.loop.mode is Mode.BOOT and not running.energised
 
 
-def test_a_drive_found_in_closed_loop_is_idled_before_all_are_heard(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
-    running = robot.robot.drives[0]
-    running.energised = True
-    robot.robot.drives = same_for_all(running)
-    robot.run_for(0.2)
-    assert robot.loop.mode is Mode.BOOT
-    assert not running.energised
-
-
-def test_clear_transmits_nothing_before_all_are_heard(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
-    listeners = [open_peer(robot, bus) for bus in ("left", "right")]
-    assert robot.loop.request(Request.CLEAR, robot.now_s) is not None
-    assert [listener.receive() for listener in listeners] == [[], []]
-
-
-def test_a_stalled_loop_idles_the_drives(walked: dict[float, Lockstep]) -> None:
+def test_a_stalled_loop_idles_the_drives(walked: dict[float, RecordedRobot]) -> None:
     robot = copy_of(walked[1.7])
-    robot.tick_number += 200
-    robot.robot.advance(robot.now_s)
-    robot.loop.tick(Tick(robot.now_s, 200 * PERIOD_S, robot.tick_number, 199))
+    robot.stall(199)
+    robot.step()
     assert robot.loop.mode is Mode.FAULT
-    assert "loop_stalled" in {fault.name for fault in robot.loop.faults.present}
+    assert "loop_stalled" in robot.fault_names
     assert robot.loop.sent.torques_nm == NO_TORQUE
 
 
 @pytest.mark.parametrize(("ticks", "leave"), [(0, True), (9, True), (11, False), (400, False)])
-def test_torques_of_a_tick_that_was_interrupted_do_not_leave(robot: Lockstep, ticks: int, leave: bool) -> None:
+def test_torques_of_a_tick_that_was_interrupted_do_not_leave(robot: RecordedRobot, ticks: int, leave: bool) -> None:
     """A stopped process continues within its tick; a drive whose watchdog does not latch would follow old torques."""
-    port = open_peer(robot, "left")
+    port = robot.buses["left"].open()
     robot.tick_number += 1
     robot.robot.advance(robot.now_s)
     tick = Tick(robot.now_s, 0.0, robot.tick_number, 0)
@@ -170,19 +126,18 @@ def test_torques_of_a_tick_that_was_interrupted_do_not_leave(robot: Lockstep, ti
     assert (robot.loop.sent.torques_nm != NO_TORQUE) is leave
 
 
-def test_the_slew_limit_does_not_grow_with_missed_ticks(walked: dict[float, Lockstep]) -> None:
+def test_the_slew_limit_does_not_grow_with_missed_ticks(walked: dict[float, RecordedRobot]) -> None:
     robot = copy_of(walked[1.7])
     before_nm = robot.loop.sent.torques_nm
-    robot.tick_number += 8
-    robot.robot.advance(robot.now_s)
-    robot.loop.tick(Tick(robot.now_s, 8 * PERIOD_S, robot.tick_number, 7))
+    robot.stall(7)
+    robot.step()
     largest_nm = robot.loop.configuration.limits.torque_rate_nm_s * PERIOD_S
     for before, after in zip(before_nm, robot.loop.sent.torques_nm, strict=True):
         assert abs(after - before) <= largest_nm + 1e-12
 
 
 def test_flippers_that_stay_in_the_mud_are_reported(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, Track([(5.0, Clay("3 kPa", 3000.0))]))
+    robot = RecordedRobot(configuration, Clay("3 kPa", 3000.0))
     robot.arm()
     robot.walk(WalkOrder(0.05, False))
     robot.run_until(lambda: robot.loop.target.phase is Phase.STANCE, 5.0)
@@ -193,9 +148,9 @@ def test_flippers_that_stay_in_the_mud_are_reported(configuration: Configuration
     assert robot.loop.events.notice == "the flippers did not come out of the mud"
 
 
-def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
+def test_a_torque_that_is_not_finite_is_never_sent(robot: RecordedRobot) -> None:
     robot.loop.controller.gains = replace(robot.loop.controller.gains, sweep_stiffness_nm_rad=float("nan"))
-    listener = open_peer(robot, "left")
+    listener = robot.buses["left"].open()
     robot.run_for(0.1)
     assert robot.loop.mode is Mode.FAULT
     assert robot.loop.fault is not None and robot.loop.fault.name == "torque_not_finite"
@@ -204,7 +159,7 @@ def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
         assert torque_nm == torque_nm
 
 
-def test_a_lease_that_is_lost_ends_with_the_torque(robot: Lockstep) -> None:
+def test_a_lease_that_is_lost_ends_with_the_torque(robot: RecordedRobot) -> None:
     """It stays lost while torque is on; then another program may take it."""
     lease = robot.loop.lease
     lease.renew("anna", robot.now_s, 0.1)
@@ -216,10 +171,10 @@ def test_a_lease_that_is_lost_ends_with_the_torque(robot: Lockstep) -> None:
     assert lease.renew("ben", robot.now_s, 0.1) is None
     robot.run_for(0.2)
     assert lease.holder is None
-    assert "lease of ben is over" in recorder_of(robot).texts
+    assert "lease of ben is over" in robot.recorder.texts
 
 
-def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot: Lockstep) -> None:
+def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot: RecordedRobot) -> None:
     wanted_nm = same_for_all(0.05)
     robot.loop.controller.step = lambda *arguments: wanted_nm  # type: ignore[method-assign]
     robot.step()
@@ -233,8 +188,8 @@ def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot
 
 
 def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Configuration) -> None:
-    quiet, noisy = Lockstep(configuration, FIRM), Lockstep(configuration, FIRM)
-    garbage = open_peer(noisy, "left")
+    quiet, noisy = RecordedRobot(configuration), RecordedRobot(configuration)
+    garbage = noisy.buses["left"].open()
     for robot in (quiet, noisy):
         robot.arm()
         robot.walk(WalkOrder(0.03))
@@ -249,28 +204,27 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
     assert repr(noisy.loop.learning.strides) == repr(quiet.loop.learning.strides)  # NaN is not equal to NaN
 
 
-def test_the_gait_advances_by_the_missed_ticks(robot: Lockstep) -> None:
+def test_the_gait_advances_by_the_missed_ticks(robot: RecordedRobot) -> None:
     robot.walk(WalkOrder(0.03))
     robot.run_until(lambda: robot.loop.target.stride == 0, 5.0)
     robot.run_for(0.2)
     before = robot.loop.controller.gait._time_s
-    robot.tick_number += 3
-    robot.robot.advance(robot.now_s)
-    robot.loop.tick(Tick(robot.now_s, 0.0, robot.tick_number, 2))
+    robot.stall(2)
+    robot.step()
     assert robot.loop.controller.gait._time_s - before == pytest.approx(3 * PERIOD_S)
 
 
-def test_every_tick_and_every_stride_is_recorded(robot: Lockstep) -> None:
+def test_every_tick_and_every_stride_is_recorded(robot: RecordedRobot) -> None:
     robot.walk(WalkOrder(0.03, True, 1))
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 10.0)
-    kinds = recorder_of(robot).kinds
+    kinds = robot.recorder.kinds
     assert kinds.count(TICK_KIND) == robot.tick_number
     assert kinds.count(STRIDE_KIND) == robot.loop.learning.strides_closed == 2
-    assert "request walk" in recorder_of(robot).texts
-    assert "mode hold to walking" in recorder_of(robot).texts
+    assert "request walk" in robot.recorder.texts
+    assert "mode hold to walking" in robot.recorder.texts
 
 
-def test_a_stop_does_not_cancel_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:
+def test_a_stop_does_not_cancel_a_clear_that_waits_for_the_drives(robot: RecordedRobot) -> None:
     robot.robot.drives[0].trip(DriveError.WATCHDOG)
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     robot.loop.request(Request.CLEAR, robot.now_s)
@@ -281,7 +235,7 @@ def test_a_stop_does_not_cancel_a_clear_that_waits_for_the_drives(robot: Lockste
 
 def test_four_drives_on_one_bus_walk_as_well(example_text: str) -> None:
     text = calibrated(example_text.replace('bus = "right"', 'bus = "left"'))
-    robot = Lockstep(parse_configuration(text), FIRM)
+    robot = RecordedRobot(parse_configuration(text))
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 1))
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 10.0)

@@ -7,7 +7,6 @@ those of the table; the fault matrix proves that each is reported in time, in ev
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -23,13 +22,12 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from simulation.devices.drive import DriveError
 from simulation.devices.odrive.device import SimulatedOdrive
-from simulation.mud.clay import MUDS, Clay
+from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
-from tests.recorded_events import EventRecorder
-from verification.faults.failing_robot import FailingRobot
-from verification.faults.injection import inject
+from tests.firmware_host.recorded_robot import RecordedRobot as Robot
+from verification.faults.injection import ACTS, inject
 
 WALK = WalkOrder(0.03, adaptive=False)
 STAGES = ("insertion", "swing", "stopping")
@@ -37,19 +35,16 @@ UP_RAD = 0.12
 JOINT = "left_adduction"
 
 
-class Robot(FailingRobot):
-    """A failing robot that stores the events of its log."""
-
-    def __init__(self, configuration: Configuration, clay: Clay = MUDS["48.5"], **options: Any) -> None:
-        self.recorder = EventRecorder()
-        super().__init__(configuration, Track([(5.0, clay)]), recorder=self.recorder, **options)
-
-
 Copied = Callable[[str], Robot]
 
 
 def mode_of(robot: Robot) -> Mode:
     return robot.loop.mode
+
+
+def is_up(robot: Robot) -> bool:
+    """Return whether both flippers are out of the mud."""
+    return all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
 
 
 def until_phase(robot: Robot, phase: Phase, and_for_s: float) -> None:
@@ -103,20 +98,6 @@ def ticks_until(robot: Robot, name: str, longest: int) -> int:
     raise AssertionError(f"no {name} in {longest} ticks, but {robot.loop.faults.present}")
 
 
-def test_a_drive_that_restarts_is_a_fault_until_it_is_cleared(at: Copied) -> None:
-    robot = at("stance")
-    fail(robot, "drive_restarted")
-    ticks_until(robot, "drive_restarted", FaultKind.DRIVE_RESTARTED.bound_ticks)
-    robot.run_for(2.0)
-    assert mode_of(robot) is Mode.FAULT
-    by_hand = {fault.name for fault in robot.loop.faults.present if fault.kind.clears is Clears.BY_HAND}
-    assert by_hand == {"drive_silent", "drive_restarted"}
-    assert robot.loop.request(Request.CLEAR, robot.now_s) is None
-    assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
-    robot.run_for(1.5)  # version and watchdog are read again in this time
-    assert robot.loop.request(Request.ARM, robot.now_s) is None
-
-
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(at: Copied, stage: str) -> None:
     robot = at(stage)
@@ -134,7 +115,7 @@ def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(at: 
 def after_release(robot: Robot) -> None:
     """Once the power is back nothing moves until an operator clears and arms."""
     robot.run_for(2.0)
-    assert mode_of(robot) in (Mode.FAULT, Mode.IDLE) and not any(drive.energised for drive in robot.robot.drives)
+    assert mode_of(robot) in (Mode.FAULT, Mode.IDLE) and not any(robot.energised)
     assert robot.loop.request(Request.ARM, robot.now_s) is not None
     for zero in robot.loop.fault_monitor.zeros:  # of joints that fell meanwhile: `clear --zero`
         zero.confirm()
@@ -168,7 +149,7 @@ def test_all_drives_that_fall_silent_at_once_have_no_power(at: Copied, stage: st
         assert refused.startswith("The motors' power was cut") and "No message" not in refused  # the cause alone
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     robot.run_for(0.6)
-    assert "power_cut" in {fault.name for fault in robot.loop.faults.present}  # the cause is still there
+    assert "power_cut" in robot.fault_names  # the cause is still there
     end(cut)
     after_release(robot)
 
@@ -182,7 +163,7 @@ def test_one_bus_or_one_drive_after_the_other_is_no_cut_of_the_power(
         robot.fail(component, "off", 3.0)
         robot.run_for(spread_s)
     robot.run_for(1.0)
-    names = {fault.name for fault in robot.loop.faults.present}
+    names = robot.fault_names
     assert "drive_silent" in names and "power_cut" not in names
 
 
@@ -252,25 +233,19 @@ def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(a
     assert any(each[2] for each in torques)  # the other joints are braked
 
 
-@pytest.mark.parametrize("stage", STAGES)
-def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, stage: str) -> None:
+@pytest.mark.parametrize(("stage", "is_held"), [*((stage, False) for stage in STAGES), ("stance", True)])
+def test_a_soft_stop_ends_in_time_with_the_flippers_up_unless_the_mud_holds_them(
+    at: Copied, stage: str, is_held: bool
+) -> None:
     robot = at(stage)
-    fail(robot, "voltage_under")
-    ticks_until(robot, "voltage_under", FaultKind.VOLTAGE_UNDER.bound_ticks)
-    assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
-    assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
-    robot.step()
-    assert all(not drive.energised for drive in robot.robot.drives)
-
-
-def test_a_soft_stop_ends_in_time_even_if_the_mud_holds_the_flippers(at: Copied) -> None:
-    robot = at("stance")
-    for arm in robot.robot.plant.arms:
+    for arm in robot.robot.plant.arms if is_held else ():
         arm.track = Track([(5.0, Clay("40 kPa", 40e3))])
     fail(robot, "voltage_under")
     ticks_until(robot, "voltage_under", FaultKind.VOLTAGE_UNDER.bound_ticks)
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
-    assert robot.robot.plant.angles_rad[1] < -UP_RAD
+    assert is_up(robot) is not is_held
+    robot.step()
+    assert not any(robot.energised)
 
 
 def test_a_fault_that_ends_with_its_cause_does_not_arm_the_robot_again(at: Copied) -> None:
@@ -284,13 +259,13 @@ def test_a_fault_that_ends_with_its_cause_does_not_arm_the_robot_again(at: Copie
     for _ in range(500):
         robot.step()
         assert mode_of(robot) is Mode.IDLE
-        assert not any(drive.energised for drive in robot.robot.drives)
+        assert not any(robot.energised)
     assert robot.loop.fault is None
     assert "stopped by voltage_under" in robot.loop.events.notice  # still shown
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
-@pytest.mark.parametrize("name", ["drive_silent", "encoder_jump", "drive_disarmed"])
+@pytest.mark.parametrize("name", ["drive_silent", "drive_restarted", "encoder_jump", "drive_disarmed"])
 def test_a_fault_that_must_be_cleared_stays_until_then_even_against_force(at: Copied, name: str) -> None:
     robot = at("stance")
     failure = fail(robot, name)
@@ -298,65 +273,61 @@ def test_a_fault_that_must_be_cleared_stays_until_then_even_against_force(at: Co
     end(failure)
     robot.run_for(1.0)
     assert mode_of(robot) is Mode.FAULT
+    assert name in {fault.name for fault in robot.loop.faults.present if fault.kind.clears is Clears.BY_HAND}
     assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
-    robot.run_for(0.5)
+    robot.run_for(1.5)  # version and watchdog are read again in this time
     assert mode_of(robot) is Mode.IDLE and not robot.loop.faults.present
     assert sum(text.startswith(f"fault {name} ") for text in robot.recorder.texts) == 1
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
 # force
 
 
+OVERRULED = "watchdog_unknown,uncalibrated"
+
+
 @pytest.fixture
-def unread(configuration: Configuration) -> Robot:
-    """Return a robot with a drive whose watchdog settings cannot be read."""
-    robot = Robot(configuration)
+def unfit(example_text: str) -> Robot:
+    """Return a robot that is not calibrated, with a drive whose watchdog settings cannot be read."""
+    robot = Robot(parse_configuration(example_text))
     drive = robot.robot.drives[2]
     assert isinstance(drive, SimulatedOdrive)
     drive._read_parameter = lambda data: []  # type: ignore[method-assign]
     robot.run_for(1.5)
-    assert {fault.name for fault in robot.loop.faults.blocking()} == {"watchdog_unknown"}
+    assert {fault.name for fault in robot.loop.faults.blocking()} == set(OVERRULED.split(","))
     return robot
 
 
-def test_arming_by_force_logs_every_overruled_fault(unread: Robot) -> None:
-    refused = unread.loop.request(Request.ARM, unread.now_s)
-    assert refused is not None and "right_sweep" in refused
-    assert unread.loop.request(Request.ARM, unread.now_s, forced="watchdog_unknown") is None
-    assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
-    assert unread.loop.forced
-    overruled = [text for text in unread.recorder.texts if text.startswith("armed by force despite ")]
-    assert len(overruled) == 1 and "watchdog_unknown" in overruled[0] and "right_sweep" in overruled[0]
-    assert "request arm by force against watchdog_unknown" in unread.recorder.texts
+def test_arming_by_force_logs_every_overruled_fault(unfit: Robot) -> None:
+    for forced, named in (("uncalibrated", ["right_sweep"]), ("watchdog_unknown", JOINTS), ("", JOINTS)):
+        refused = unfit.loop.request(Request.ARM, unfit.now_s, forced=forced)
+        assert refused is not None and all(joint in refused for joint in named)
+    assert unfit.loop.request(Request.ARM, unfit.now_s, forced=OVERRULED) is None
+    assert unfit.run_until(lambda: mode_of(unfit) is Mode.HOLD, 1.0)
+    assert unfit.loop.forced and "uncalibrated" in unfit.fault_names
+    watchdog, calibration = unfit.recorder.about("armed by force despite ")
+    assert "watchdog_unknown" in watchdog and "right_sweep" in watchdog
+    assert "uncalibrated" in calibration and all(joint in calibration for joint in JOINTS)
+    assert f"request arm by force against {OVERRULED}" in unfit.recorder.texts
 
 
-def test_a_robot_that_is_not_calibrated_is_armed_only_with_a_waiver(example_text: str) -> None:
-    robot = Robot(parse_configuration(example_text))
-    robot.run_for(1.5)
-    assert {fault.name for fault in robot.loop.faults.blocking()} == {"uncalibrated"}
-    refused = robot.loop.request(Request.ARM, robot.now_s)
-    assert refused is not None and all(joint in refused for joint in JOINTS)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced="uncalibrated") is None
-    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
-    assert robot.loop.forced and "uncalibrated" in {fault.name for fault in robot.loop.faults.present}
-
-
-@pytest.mark.parametrize("name", ["drive_silent", "everything", "disk_low"])
-def test_force_overrules_the_one_check_that_it_names(unread: Robot, name: str) -> None:
-    refused = unread.loop.request(Request.ARM, unread.now_s, forced=name)
+@pytest.mark.parametrize("name", ["everything", "disk_low"])
+def test_force_overrules_the_one_check_that_it_names(unfit: Robot, name: str) -> None:
+    refused = unfit.loop.request(Request.ARM, unfit.now_s, forced=name)
     assert refused is not None and (name in refused) is (name != "disk_low")
 
 
-def test_a_disarmed_request_by_force_leaves_no_trace(unread: Robot) -> None:
-    assert unread.loop.request(Request.ARM, unread.now_s, forced="watchdog_unknown") is None
-    unread.loop.request(Request.DISARM, unread.now_s)
-    unread.step()
-    assert mode_of(unread) is Mode.IDLE
-    assert unread.loop.request(Request.ARM, unread.now_s) is not None
-    unread.run_for(0.1)
-    assert mode_of(unread) is Mode.IDLE
+def test_a_disarmed_request_by_force_leaves_no_trace(unfit: Robot) -> None:
+    assert unfit.loop.request(Request.ARM, unfit.now_s, forced=OVERRULED) is None
+    unfit.loop.request(Request.DISARM, unfit.now_s)
+    unfit.step()
+    assert mode_of(unfit) is Mode.IDLE
+    assert unfit.loop.request(Request.ARM, unfit.now_s) is not None
+    unfit.run_for(0.1)
+    assert mode_of(unfit) is Mode.IDLE
 
 
 def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
@@ -370,32 +341,21 @@ def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
 # faults that hold, and warnings
 
 
-def hold_by_a_fault(robot: Robot) -> None:
-    """Lose the currents of one drive for five ticks: enough for a hold, too few for a stop."""
+def test_during_a_fault_with_hold_the_robot_stops_on_request_and_walks_again_after_it(at: Copied) -> None:
+    """The currents of one drive are lost for five ticks: enough for a hold, too few for a stop."""
+    robot = at("stance")
     silent = fail(robot, "current_stale")
     ticks_until(robot, "current_stale", FaultKind.CURRENT_STALE.bound_ticks)
     end(silent)
-
-
-def test_a_stop_during_a_fault_with_hold_raises_the_flippers(at: Copied) -> None:
-    robot = at("stance")
-    hold_by_a_fault(robot)
     assert mode_of(robot) is Mode.HOLD
     assert robot.loop.faults.reaction is Reaction.HOLD
-    assert robot.robot.plant.angles_rad[1] < -UP_RAD
+    assert not is_up(robot)
+    assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
     assert robot.loop.request(Request.STOP, robot.now_s) is None
     robot.step()
     assert mode_of(robot) is Mode.STOPPING
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, SOFT_STOP_S)
-    assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
-
-
-def test_a_fault_with_hold_ends_by_itself_and_the_robot_walks_on_request(at: Copied) -> None:
-    robot = at("stance")
-    hold_by_a_fault(robot)
-    assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
-    robot.run_for(0.2)
-    assert (mode_of(robot), robot.loop.faults.present) == (Mode.HOLD, [])
+    assert is_up(robot) and not robot.loop.faults.present
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is None
     robot.step()
     assert mode_of(robot) is Mode.WALKING
@@ -410,7 +370,18 @@ def test_warnings_change_no_torque(at: Copied) -> None:
         warned.step()
         assert warned.loop.sent == well.loop.sent
     assert mode_of(warned) is Mode.WALKING
-    assert {"voltage_low", "bus_warning"} <= {fault.name for fault in warned.loop.faults.present}
+    assert {"voltage_low", "bus_warning"} <= warned.fault_names
+
+
+@pytest.mark.parametrize("step_s", [-2.0, -0.012, 0.005, 0.1])
+def test_a_walk_goes_on_while_the_wall_clock_is_stepped(at: Copied, step_s: float) -> None:
+    """The kernel stamps frames with this clock."""
+    robot = at("insertion")
+    with ACTS["wall_clock_stepped"](robot, JOINT, step_s):
+        for _ in range(300):
+            robot.step()
+            assert robot.loop.faults.reaction is Reaction.NONE
+    assert mode_of(robot) is Mode.WALKING
 
 
 def test_a_robot_without_requests_disarms_by_itself(configuration: Configuration) -> None:
@@ -421,10 +392,7 @@ def test_a_robot_without_requests_disarms_by_itself(configuration: Configuration
     assert mode_of(robot) is Mode.HOLD
     robot.run_for(0.2)
     assert mode_of(robot) is Mode.IDLE
-    assert not any(drive.energised for drive in robot.robot.drives)
-
-
-# no false alarms
+    assert not any(robot.energised)
 
 
 def test_a_lease_that_is_lost_right_after_an_arm_request_prevents_arming(at: Copied) -> None:

@@ -1,7 +1,6 @@
 """The source of the body's pose: its configuration, opening, and report."""
 
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from math import isfinite
 from pathlib import Path
@@ -9,25 +8,21 @@ from typing import Any
 
 import pytest
 
-from control.modes import Mode
-from control.records import BodyPose
 from drivers.pose.natnet_bridge import NatNetBridge
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import parse_axis
 from drivers.pose.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
 from drivers.pose.rail_encoder import RailEncoder
-from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, PoseParameters
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION, PoseParameters
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.daemon import EXIT_FAILED, main, reopen_pose
+from firmware_host.daemon import EXIT_FAILED, main
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.pose_sources import open_pose
 from simulation.devices.natnet_server import NatNetServer, RecordedPose
 from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
+from tests.firmware_host.recorded_robot import RecordedRobot
 from tests.waiting import LONGEST_S
 
 NATNET = 'source = "natnet"\n'
@@ -105,14 +100,8 @@ def test_an_axis_is_a_unit_vector() -> None:
     assert parse_axis("x") == (1.0, 0.0, 0.0)
     assert parse_axis("-z") == (0.0, 0.0, -1.0)
     assert parse_axis([0, 3, -4.0]) == (0.0, 0.6, -0.8)
-    assert (
-        parse_axis("--x")
-        is parse_axis("")
-        is parse_axis(3)
-        is parse_axis(["x", 0, 0])
-        is parse_axis([10**400, 0, 0])
-        is None
-    )
+    for malformed in ("--x", "", 3, ["x", 0, 0], [10**400, 0, 0]):
+        assert parse_axis(malformed) is None
 
 
 def test_the_chosen_source_is_opened(example_text: str, short_folder: Path) -> None:
@@ -181,60 +170,27 @@ def test_the_daemon_exits_with_a_message_if_the_source_does_not_open(
     assert main(["--config", str(path)]) == EXIT_CONFIGURATION
 
 
-class LostSource:
-    """A source that was lost, and can be opened again once."""
-
-    def __init__(self) -> None:
-        self.reported = PoseReport("camera", 12, 3, 4)
-        self.gone = True
-
-    def read(self, now_s: float) -> BodyPose:
-        return BodyPose()
-
-    def report(self) -> PoseReport:
-        return self.reported
-
-    def reopen(self, now_s: float) -> bool:
-        self.gone, was_gone = False, self.gone
-        return was_gone
-
-    def close(self) -> None:
-        return
-
-
-@pytest.fixture
-def robot(configuration: Configuration) -> Iterator[Lockstep]:
-    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
-    robot.run_until(lambda: robot.loop.mode is Mode.IDLE, 3.0)
-    yield robot
-
-
-def pose_line(robot: Lockstep) -> dict[str, Any]:
+def pose_line(robot: RecordedRobot) -> dict[str, Any]:
     (line,) = [item for item in arming_checks(robot.loop, []) if item["id"] == "pose"]
     return line
 
 
-def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(robot: Lockstep) -> None:
-    source = robot.loop.pose = LostSource()
+def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(
+    robot: RecordedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = NoPose()
+    robot.loop.pose = source
+    reported = PoseReport("camera", 12, 3, 4)
+    monkeypatch.setattr(source, "report", lambda: reported)
     line = pose_line(robot)
     assert line["ok"] and line["text"] == "camera: 12 poses, 3 malformed messages, 4 without the body"
-    source.reported = source.reported._replace(trouble="it is dark.", what_to_do="switch on the light")
+    reported = reported._replace(trouble="it is dark.", what_to_do="switch on the light")
     line = pose_line(robot)
     assert line["ok"] and line["warning"] and line["fix"] == "switch on the light"
     assert line["text"].startswith("it is dark. camera: 12 poses")
 
 
-def test_a_source_is_opened_again_only_while_the_torque_is_off(robot: Lockstep) -> None:
-    source = LostSource()
-    robot.arm()
-    reopen_pose(robot.loop, source, robot.now_s)
-    assert source.gone
-    robot.loop.mode = Mode.IDLE
-    reopen_pose(robot.loop, source, robot.now_s)
-    assert not source.gone
-
-
-def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) -> None:
+def test_a_socket_s_poses_reach_the_loop(robot: RecordedRobot, short_folder: Path) -> None:
     with closing(open_pose(PoseParameters(socket=str(short_folder / "pose")))) as pose:
         robot.loop.pose = pose
         sender = PoseSender(short_folder / "pose")
@@ -243,7 +199,7 @@ def test_a_socket_s_poses_reach_the_loop(robot: Lockstep, short_folder: Path) ->
         assert robot.loop.body.x_m == 0.25
         robot.run_for(0.3)
         assert not isfinite(robot.loop.body.x_m)
-        assert "pose_lost" in {fault.name for fault in robot.loop.faults.present}
+        assert "pose_lost" in robot.fault_names
         line = pose_line(robot)
         assert line["warning"] and line["fix"] and f"no pose arrives at {short_folder}/pose any more" in line["text"]
         sender.close()

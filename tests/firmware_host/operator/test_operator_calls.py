@@ -21,12 +21,8 @@ from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import METHODS, Level
 from firmware_host.trial import BEGUN, SET, OperatorReport, from_json, read_report
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
 from tests.control.synthetic_muds import stride as closed_stride
-from tests.copied_robots import copy_of
-from tests.recorded_events import EventRecorder
+from tests.firmware_host.recorded_robot import RecordedRobot
 
 ANNA = Caller(1, Peer(77, 1000, frozenset({71})), Level.DRIVE)
 BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
@@ -36,35 +32,25 @@ WALL_S = 1_800_000_000.25
 class Robot:
     """A simulated robot with the methods of its socket."""
 
-    def __init__(self, robot: Lockstep) -> None:
-        assert isinstance(robot.loop.recorder, EventRecorder)
-        self.events, self.steps, self.lease = robot.loop.recorder, robot, robot.loop.lease
-        calls = OperatorCalls(self.steps.loop, [], lambda: self.steps.now_s, lambda: WALL_S)
-        self._methods = calls.methods
+    def __init__(self, robot: RecordedRobot) -> None:
+        self.events, self.steps, self.lease = robot.recorder, robot, robot.loop.lease
+        self._methods = OperatorCalls(robot.loop, [], lambda: robot.now_s, lambda: WALL_S).methods
 
     def ask(self, method: str, caller: Caller = ANNA, **params: Any) -> Any:
         return self._methods[method](params, caller)
 
-
-def new_robot(configuration: Configuration) -> Lockstep:
-    return Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=EventRecorder())
-
-
-@pytest.fixture
-def robot(configuration: Configuration) -> Robot:
-    return Robot(new_robot(configuration))
-
-
-@pytest.fixture(scope="module")
-def armed_robot(configuration: Configuration) -> Lockstep:
-    robot = new_robot(configuration)
-    robot.arm()
-    return robot
+    def run_until_stride(self, stride: int) -> None:
+        assert self.steps.run_until(lambda: self.steps.loop.target.stride == stride, 20.0)
 
 
 @pytest.fixture
-def armed(armed_robot: Lockstep) -> Robot:
-    return Robot(copy_of(armed_robot))
+def idle(configuration: Configuration) -> Robot:
+    return Robot(RecordedRobot(configuration))
+
+
+@pytest.fixture
+def armed(robot: RecordedRobot) -> Robot:
+    return Robot(robot)
 
 
 def test_the_log_names_the_sender_of_each_request(armed: Robot) -> None:
@@ -93,27 +79,22 @@ def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed:
     assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
 
 
-def test_a_repeated_request_is_logged_once_a_second(robot: Robot) -> None:
-    robot.steps.run_for(1.0)
+def test_a_repeated_request_is_logged_once_a_second(idle: Robot) -> None:
+    idle.steps.run_for(1.0)
     for _ in range(400):
-        robot.ask("clear")
-        robot.steps.step()
-    assert robot.events.about("request") == [
+        idle.ask("clear")
+        idle.steps.step()
+    assert idle.events.about("request") == [
         "request clear by uid 1000 (process 77)",
         "request clear by uid 1000 (process 77); 379 before it changed nothing or were repeated",
     ]
-
-
-def test_a_refused_request_is_not_logged(robot: Robot) -> None:
-    with pytest.raises(RefusedError):
-        robot.ask("walk")
-    assert not [text for text in robot.events.texts if "uid" in text]
 
 
 def test_answers_have_the_keys_of_the_table(armed: Robot) -> None:
     assert list(armed.ask("status")) == list(METHODS["status"].answer_keys)
     assert list(armed.ask("hello")) == list(METHODS["hello"].answer_keys)
     assert set(armed.ask("check")[0]) == set(METHODS["check"].answer_keys)
+    assert all(0.0 <= drive["angle_age_s"] < 0.1 for drive in armed.ask("status")["drives"])
 
 
 def test_a_described_walk_is_a_trial_and_so_is_the_walk_after_it(armed: Robot) -> None:
@@ -138,24 +119,20 @@ def test_a_described_walk_is_a_trial_and_so_is_the_walk_after_it(armed: Robot) -
     assert armed.ask("status")["trial"] == {}
 
 
-def test_new_defaults_go_to_the_log_whose_writer_stores_them(robot: Robot) -> None:
-    robot.ask("trial_set", mud="A")
-    report = read_report(robot.events.texts[-1])
+def test_new_defaults_go_to_the_log_whose_writer_stores_them(idle: Robot) -> None:
+    idle.ask("trial_set", mud="A")
+    report = read_report(idle.events.texts[-1])
     assert report and (report.kind, from_json(report.text)) == (SET, {"mud": "A"})
 
 
-def test_a_status_has_the_age_of_each_position(armed: Robot) -> None:
-    assert all(0.0 <= drive["angle_age_s"] < 0.1 for drive in armed.ask("status")["drives"])
-
-
 @pytest.mark.parametrize("method", ["note", "mark"])
-def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None:
+def test_a_note_and_a_marker_have_both_clocks(idle: Robot, method: str) -> None:
     text = "clap: 👏" + 893 * "𓆣"  # the longest
-    answer = robot.ask(method, text=text)
-    assert len(robot.events.texts[-1].encode()) < LONGEST_TEXT
-    report = read_report(robot.events.texts[-1])
+    answer = idle.ask(method, text=text)
+    assert len(idle.events.texts[-1].encode()) < LONGEST_TEXT
+    report = read_report(idle.events.texts[-1])
     assert report and report.text == text and report.time.timestamp() == WALL_S
-    assert answer == {"stamp_s": robot.steps.now_s, "time": report.time.isoformat(timespec="microseconds")}
+    assert answer == {"stamp_s": idle.steps.now_s, "time": report.time.isoformat(timespec="microseconds")}
 
 
 @pytest.mark.parametrize(
@@ -163,12 +140,9 @@ def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None
     [
         ("note", {"text": "x" * 901}, "text"),
         ("note", {"text": "a\nb"}, "text"),
-        ("note", {"text": "\x1b[2J"}, "text"),
         ("mark", {"text": 3}, "text"),
         ("trial_set", {"Mud": "A"}, "'Mud'"),
-        ("trial_set", {"a b": "A"}, "'a b'"),
         ("trial_set", {"plate": 1.0}, "plate"),
-        ("trial_set", {"water": "wet"}, "water"),
         ("trial_set", {"water": "nan"}, "water"),
         ("trial_set", {name: "ü" * 900 for name in ("mud", "note")}, "3000"),
         ("walk", {"water": "101"}, "water"),
@@ -176,41 +150,40 @@ def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None
     ],
 )  # fmt: skip
 def test_a_description_that_cannot_be_logged_is_refused_with_its_key(
-    robot: Robot, method: str, params: dict[str, Any], reason: str
+    idle: Robot, method: str, params: dict[str, Any], reason: str
 ) -> None:
     with pytest.raises(RefusedError) as refused:
-        robot.ask(method, **params)
+        idle.ask(method, **params)
     assert reason in str(refused.value) and len(str(refused.value)) < 200
-    assert robot.ask("trial") == {"defaults": {}, "present": {}} and not robot.events.about("uid")
+    assert idle.ask("trial") == {"defaults": {}, "present": {}} and not idle.events.about("uid")
 
 
 @pytest.mark.parametrize("end", ["hang_up", "silence"])
-def test_a_lease_that_ends_with_torque_off_does_not_block_arming(robot: Robot, end: str) -> None:
-    robot.steps.run_for(1.0)
-    robot.ask("lease", for_s=0.5)
+def test_a_lease_that_ends_with_torque_off_does_not_block_arming(idle: Robot, end: str) -> None:
+    idle.steps.run_for(1.0)
+    idle.ask("lease", for_s=0.5)
     if end == "hang_up":
-        robot.lease.hang_up(ANNA)
-    robot.steps.run_for(PERIOD_S if end == "hang_up" else 0.5 + 2 * PERIOD_S)
-    assert robot.ask("status")["faults"] == [] and not robot.events.about("lease_lost")
-    assert robot.events.texts[-1] == "lease of uid 1000 (process 77) is over"
-    assert robot.ask("arm", BEN) == "accepted"
-    robot.steps.run_for(0.5)
-    assert robot.ask("status")["mode"] == "hold"
+        idle.lease.hang_up(ANNA)
+    idle.steps.run_for(PERIOD_S if end == "hang_up" else 0.5 + 2 * PERIOD_S)
+    assert idle.ask("status")["faults"] == [] and not idle.events.about("lease_lost")
+    assert idle.events.texts[-1] == "lease of uid 1000 (process 77) is over"
+    assert idle.ask("arm", BEN) == "accepted"
+    idle.steps.run_for(0.5)
+    assert idle.ask("status")["mode"] == "hold"
 
 
-def test_a_program_that_ends_right_after_its_request_to_arm_arms_nothing(robot: Robot) -> None:
-    robot.steps.run_for(1.0)
-    robot.ask("arm", lease_s=0.5)
-    robot.lease.hang_up(ANNA)
-    robot.steps.run_for(0.2)
-    assert robot.ask("status")["mode"] == "idle" and not robot.events.about("mode idle to arming")
-
-
-def test_an_operator_resets_no_timing_while_another_user_holds_the_lease(armed: Robot) -> None:
-    armed.ask("lease", for_s=0.5)
+def test_a_lease_is_that_of_one_connection_and_keeps_only_other_users_from_the_timing(armed: Robot) -> None:
+    second_program = ANNA._replace(connection=3)
+    for _ in range(5):
+        armed.ask("lease", for_s=0.5)
+        armed.steps.run_for(0.2)
+    assert armed.lease.held and not armed.lease.lost(armed.steps.now_s)
+    assert armed.events.about("lease") == ["lease taken by uid 1000 (process 77)"]
+    with pytest.raises(RefusedError, match="operates the robot"):
+        armed.ask("lease", second_program, for_s=0.5)
     with pytest.raises(RefusedError, match="uid 1000 .* operates the robot"):
         armed.ask("reset_timing", BEN)
-    assert armed.ask("reset_timing") == "accepted"  # the user's own second program may
+    assert armed.ask("reset_timing", second_program) == "accepted"
     armed.ask("release")
     assert armed.ask("reset_timing", BEN) == "accepted"
 
@@ -278,7 +251,7 @@ def test_a_walk_can_take_the_lease(armed: Robot) -> None:
     assert armed.ask("status")["mode"] == "stopping"
 
 
-@pytest.mark.parametrize("for_s", [None, True, "0.5", 0, 0.09, 10.1, -1.0, nan, 2**70])
+@pytest.mark.parametrize("for_s", [None, True, "0.5", 0.09, 10.1, nan, 2**70])
 def test_a_lease_lasts_from_0_1_to_10_seconds(armed: Robot, for_s: Any) -> None:
     for method, name in (("lease", "for_s"), ("walk", "lease_s")):
         with pytest.raises(RefusedError, match=rf"^{name} = .*: must be a number from 0.1 to 10"):
@@ -287,37 +260,24 @@ def test_a_lease_lasts_from_0_1_to_10_seconds(armed: Robot, for_s: Any) -> None:
     assert not armed.lease.held and armed.ask("status")["mode"] == "hold"
 
 
-def test_a_renewed_lease_is_logged_once(armed: Robot) -> None:
-    for _ in range(5):
-        armed.ask("lease", for_s=0.5)
-        armed.steps.run_for(0.2)
-    assert armed.lease.held and not armed.lease.lost(armed.steps.now_s)
-    assert armed.events.texts.count("lease taken by uid 1000 (process 77)") == 1
-
-
-def test_another_connection_of_the_same_user_is_another_holder(armed: Robot) -> None:
-    armed.ask("lease", for_s=0.5)
-    with pytest.raises(RefusedError, match="operates the robot"):
-        armed.ask("lease", ANNA._replace(connection=3), for_s=0.5)
-
-
-def test_a_clear_is_refused_in_hold(armed: Robot) -> None:
+def test_a_refused_request_is_not_logged(armed: Robot) -> None:
     with pytest.raises(RefusedError, match="^nothing to clear"):
         armed.ask("clear")
+    assert not armed.events.about("uid")
 
 
-def test_zeros_are_confirmed_at_rest_only(robot: Robot) -> None:
-    robot.steps.run_for(1.0)
-    loop, rest = robot.steps.loop, robot.steps.loop.states
+def test_zeros_are_confirmed_at_rest_only(idle: Robot) -> None:
+    idle.steps.run_for(1.0)
+    loop, rest = idle.steps.loop, idle.steps.loop.states
     loop.fault_monitor.zeros[2].shift_rad = 0.5
     loop.states = rest.map(lambda state: state._replace(velocity_rad_s=0.31))
     with pytest.raises(RefusedError, match=r"^left_sweep turns at 0.31 rad/s: must be at most 0.3 rad/s"):
-        robot.ask("clear", zero=True)
+        idle.ask("clear", zero=True)
     assert loop.fault_monitor.zeros[2].shift_rad == 0.5
     loop.states = rest
-    robot.ask("clear", zero=True)
+    idle.ask("clear", zero=True)
     assert loop.fault_monitor.zeros[2].shift_rad == 0.0
-    assert any(text.startswith("zero of right_sweep confirmed by") for text in robot.events.texts)
+    assert any(text.startswith("zero of right_sweep confirmed by") for text in idle.events.texts)
 
 
 def test_a_move_changes_only_the_requested_joints(armed: Robot) -> None:
@@ -373,16 +333,15 @@ def test_moves_at_a_rate_go_on_without_jumps_and_are_logged_once_a_second(armed:
     assert len(armed.events.about("move")) == 2
 
 
-def test_flippers_that_may_be_in_the_mud_are_raised_before_they_are_moved(armed: Robot) -> None:
-    armed.steps.loop.controller.cut_short = True
-    with pytest.raises(RefusedError, match="'mudskipper stop' raises them first"):
-        armed.ask("move", left_sweep_rad=0.3)
-
-
-def test_a_move_that_a_present_fault_would_end_is_refused(armed: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_joints_are_not_moved_in_the_mud_nor_against_a_present_fault(
+    armed: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fault = FaultKind.CURRENT_STALE.fault("left_sweep")
     monkeypatch.setattr(Loop, "fault", fault)
     with pytest.raises(RefusedError, match=re.escape(fault.message)):
+        armed.ask("move", left_sweep_rad=0.3)
+    armed.steps.loop.controller.cut_short = True
+    with pytest.raises(RefusedError, match="'mudskipper stop' raises them first"):
         armed.ask("move", left_sweep_rad=0.3)
 
 
@@ -391,8 +350,6 @@ def test_a_move_that_a_present_fault_would_end_is_refused(armed: Robot, monkeypa
     [
         ({}, "no joint is named: at least one of left_sweep_rad"),
         ({"tail_rad": 0.1}, "there is no parameter 'tail_rad'"),
-        ({"left_sweep": 0.1}, "there is no parameter 'left_sweep'"),
-        ({"left_sweep_rad": "far"}, "left_sweep_rad = 'far': must be a number"),
         ({"left_sweep_rad": True}, "must be a number"),
         ({"left_sweep_rad": nan}, "must be a number"),
         ({"left_sweep_rad": 3.0}, "left_sweep = 171.9 degrees: must be from"),
@@ -405,23 +362,21 @@ def test_an_invalid_move_is_refused_with_its_reason(armed: Robot, angles_rad: di
     assert not armed.ask("status")["moving"]
 
 
-def test_what_moves_the_robot_refuses_unknown_parameters_and_other_methods_ignore_them(robot: Robot) -> None:
+def test_what_moves_the_robot_refuses_unknown_parameters_and_other_methods_ignore_them(idle: Robot) -> None:
     for method in ("walk", "move", "stride"):
         with pytest.raises(RefusedError, match="there is no parameter 'wtaer' here"):
-            robot.ask(method, wtaer="49")
-    assert robot.ask("hello", later_version=1) == robot.ask("hello")
-    assert robot.ask("stop", reason="lunch") == "accepted"
+            idle.ask(method, wtaer="49")
+    assert idle.ask("hello", later_version=1) == idle.ask("hello")
+    assert idle.ask("stop", reason="lunch") == "accepted"
 
 
-@pytest.mark.parametrize(
-    ("reported_v", "lowest_v"), [((nan, 23.0), 23.0), ((23.0, nan), 23.0), ((24.0, 23.0), 23.0), ((nan, nan), None)]
-)
+@pytest.mark.parametrize(("reported_v", "lowest_v"), [((nan, 23.0), 23.0), ((24.0, 23.0), 23.0), ((nan, nan), None)])
 def test_a_flipper_whose_drives_report_no_voltage_hides_not_that_of_the_other(
-    robot: Robot, reported_v: tuple[float, float], lowest_v: float | None
+    idle: Robot, reported_v: tuple[float, float], lowest_v: float | None
 ) -> None:
     closed = [ClosedStride(number, closed_stride(), 0.03, each_v) for number, each_v in enumerate(reported_v)]
-    robot.steps.loop.learning.strides = closed
-    assert robot.ask("status")["stride_supply_min_v"] == lowest_v
+    idle.steps.loop.learning.strides = closed
+    assert idle.ask("status")["stride_supply_min_v"] == lowest_v
 
 
 def test_a_walk_with_a_null_depth_adapts_its_depth(armed: Robot) -> None:
@@ -437,7 +392,7 @@ def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(a
         armed.ask("depth", depth_m=0.02)
     assert armed.ask("status")["next_depth_m"] == loop.configuration.adaptation.initial_depth_m  # `joy` goes on from it
     armed.ask("walk")
-    armed.steps.run_until(lambda: loop.target.stride == 1, 20.0)
+    armed.run_until_stride(1)
     with pytest.raises(RefusedError, match="max_depth_m"):
         armed.ask("depth", depth_m=0.2)
     begun_m = loop.stride_depth_m
@@ -446,7 +401,7 @@ def test_the_depth_of_a_walk_changes_with_the_next_stride_and_no_longer_adapts(a
     assert loop.stride_depth_m == begun_m != 0.02
     report = armed.ask("status")
     assert (report["next_depth_m"], report["depth_reason"]) == (0.02, "fixed")
-    armed.steps.run_until(lambda: loop.target.stride == 3, 20.0)
+    armed.run_until_stride(2)
     assert loop.stride_depth_m == 0.02 and armed.events.texts.count(f"depth 0.0200 m by {ANNA}") == 1
 
 
@@ -457,18 +412,18 @@ def test_a_walk_takes_several_depths_in_turn_until_one_is_fixed(armed: Robot) ->
             armed.ask("walk", depths_m=depths_m, depth_m=depth_m)
     armed.ask("walk", depths_m=[0.02, 0.03])
     for stride in range(3):
-        armed.steps.run_until(lambda stride=stride: loop.target.stride == stride, 20.0)  # type: ignore[misc]
+        armed.run_until_stride(stride)
         walked_m.append(loop.stride_depth_m)
     assert walked_m == [0.02, 0.03, 0.02]
     armed.ask("depth", depth_m=0.025)
-    armed.steps.run_until(lambda: loop.target.stride == 4, 20.0)
+    armed.run_until_stride(3)
     assert loop.stride_depth_m == 0.025
 
 
 def test_strides_to_come_have_the_ordered_sweep_and_speeds_within_the_joints_reach(armed: Robot) -> None:
     loop = armed.steps.loop
     armed.ask("walk", depth_m=0.03)
-    armed.steps.run_until(lambda: loop.target.stride == 1, 20.0)
+    armed.run_until_stride(1)
     too_wide = (("sweep_angle_deg", 59.0), ("sweep_angle_deg", 61.0))  # the first does not reach 3 cm
     for key, value in (*too_wide, ("stance_speed_m_s", 0.0), ("sweep", 20.0)):
         with pytest.raises(RefusedError):
