@@ -51,7 +51,6 @@ SOCKET = "/run/mudskipper/mudskipper.sock"
 REFUSED = [  # a text of the example, its replacement, and the beginnings of the messages
     ("torque_nm = 0.75", "torqe_nm = 0.5", ["limits.torqe_nm: there is no such key"]),
     ("torque_nm = 0.75", "torque_nm = 9.5", ["limits.torque_nm = 9.5: must be at most 5.0"]),
-    ("torque_nm = 0.75", "torque_nm = nan", ["limits.torque_nm = "]),
     ("torque_nm = 0.75", 'torque_nm = "0.75"', ["limits.torque_nm = '0.75': should be a valid number"]),
     ("[status]", '[pose]\nsource = "rail_encoder"\nrail_encoder = { device = "/dev/ttyACM0" }\n[status]', [
         "pose.rail_encoder.metres_per_count = 0.0: must be given"
@@ -74,7 +73,6 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("torque_nm = 0.75", "torque_nm = 0.75\nadduction_min_deg = -30.0", [
         "limits.adduction_min_deg = -30.0: must be at most -57"
     ]),
-    ("[arm]", "[arm]\nsweep_inertia_kg_m2 = 0.0", ["arm.sweep_inertia_kg_m2 = 0.0: must be at least 1e-05"]),
     ("node_id = 0", "node_id = -1", ["drive.left_sweep.node_id = -1: must be at least 0"]),
     ("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0", [
         "drive.left_sweep.current_limit_a = 5.0: must be at least 9.04 for limits.torque_nm = 0.75"
@@ -89,18 +87,12 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
         "drive.left_sweep.type = 'moteus': uses CAN FD, which disturbs drive.left_adduction (odrive) on the same"
     ]),
-    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"', [
-        "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
-    ]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"\nproven_watchdog = { watchdog_s = 0.3 }', [
         "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
     ]),
     ("node_id = 0", 'node_id = 16\ntype = "mit"', ["drive.left_sweep.node_id = 16: must be at most 15"]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nvelocity_range_rad_s = 0.0', [
         "drive.left_sweep.velocity_range_rad_s = 0: must be 1 to 500, or -1 for that of the model"
-    ]),
-    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nvelocity_range_rad_s = 501.0', [
-        "drive.left_sweep.velocity_range_rad_s = 501.0: must be at most 500.0"
     ]),
     *[
         ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nfirmware_date = "2026-11-01"\n'
@@ -152,7 +144,6 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ('name = "mudskipper"', 'name = "../../x"', ["robot.name = '../../x': must be 1 to 64"]),
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
     (SOCKET, "x" * 120, [f"status.socket = '{'x' * 120}': must be at most 97 bytes"]),
-    (SOCKET, "", ["status.socket = '': must name a socket"]),
     (SOCKET, "/", ["status.socket = '/': must name a socket"]),
     *[
         ("[status]", f'[pose]\nsocket = "/run/mudskipper/./{name}.sock"\n[status]', [
@@ -164,6 +155,21 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         "emergency_stop.device = '': must be given", "emergency_stop.key = '': must be given"
     ]),
     ("[status]", '[status]\nread_group = "a\\u0000b"', ["status.read_group: must be without a zero byte"]),
+    ('directory = "', 'directory = "a\\u0000', ["log.directory = 'a\\x00/var/lib/mudskipper/logs': must be"]),
+    ("max_depth_m = 0.05", "max_depth_m = 0.06", ["adaptation.max_depth_m = 0.06: out of reach, must be at most 0.05"]),
+    ("sweep_angle_deg = 30.0", "sweep_angle_deg = 35.0", ["adaptation.max_depth_m = 0.05: out of reach"]),
+    ("initial_depth_m = 0.03", "initial_depth_m = 0.06", ["adaptation.initial_depth_m = 0.06: must be from"]),
+    ("min_depth_m = 0.015", "min_depth_m = 0.06", [
+        "adaptation.initial_depth_m = 0.03: must be from", "adaptation.min_depth_m = 0.06: must be at most"
+    ]),
+    ("drop_m = 0.050", "drop_m = 0.0645", ["geometry.axis_height_m = 0.0645: must be more than geometry.drop_m"]),
+    ("torque_nm = 0.75", "torque_nm = 0.75\nadduction_max_deg = -1.0", [
+        "limits.adduction_max_deg = -1.0: must be at least 0, the raised arm"
+    ]),
+    ("sign = 1", "sign = 0", ["drive.left_sweep.sign = 0: must be 1 or -1"]),
+    ("free_body = false", "free_body = true\nfixed_base = true", [
+        "estimation.free_body = true: no body on a fixed base is free"
+    ]),
 ]  # fmt: skip
 
 
@@ -173,21 +179,6 @@ def test_a_wrong_value_is_refused_by_its_key(example_text: str, old: str, new: s
     problems = problems_of(example_text.replace(old, new, 1))
     assert len(problems) == len(messages)
     assert all(problem.startswith(message) for problem, message in zip(problems, messages, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "message"),
-    [
-        ("max_depth_m", "0.06", "adaptation.max_depth_m = 0.06: out of reach, must be at most 0.0503"),
-        ("sweep_angle_deg", "35.0", "adaptation.max_depth_m = 0.05: out of reach"),
-        ("initial_depth_m", "0.06", "adaptation.initial_depth_m = 0.06: must be from"),
-        ("min_depth_m", "0.06", "adaptation.min_depth_m = 0.06: must be at most adaptation.max_depth_m"),
-        ("sign", "0", "drive.left_sweep.sign = 0: must be 1 or -1"),
-        ("free_body", "true\nfixed_base = true", "estimation.free_body = true: no body on a fixed base is free"),
-    ],
-)
-def test_a_value_that_contradicts_another_is_refused(example_text: str, key: str, value: str, message: str) -> None:
-    assert any(problem.startswith(message) for problem in problems_of(changed(example_text, key, value)))
 
 
 def test_drives_share_neither_a_missing_bus_nor_an_id() -> None:
@@ -326,16 +317,9 @@ def test_a_plate_is_a_rectangle_or_the_corners_of_the_file() -> None:
             "geometry.plate_height_m = 0.06: must be left out where geometry.plate_corners_m gives the plate",
         ),
         ("plate_corners_m = [[0.0, 0.0], [0.02, 0.06]]", "geometry.plate_corners_m: has 2 corners"),
-        (
-            "plate_corners_m = [[-0.02, 0.0], [0.02, 0.06], [0.02, 0.0], [-0.02, 0.06]]",
-            "geometry.plate_corners_m: the edge from corner 1 to 2 crosses",
-        ),
-        ("plate_corners_m = [[0, 0], [0, 0.06], [0, 0.03]]", "geometry.plate_corners_m: the plate is 0 m wide"),
-        ("plate_corners_m = [[0, 0], [20, 0.06], [0.02, 0]]", "geometry.plate_corners_m: corner 2: 20 m outward"),
         ("plate_corners_m = 5", "geometry.plate_corners_m = 5: must be an array, in [brackets]"),
         ("plate_corners_m = [[0, 0], [0.02], [-0.02, 0.06]]", "geometry.plate_corners_m 2 = [0.02]: "),
         ("plate_corners_m = [[0, 0], [0.02, nan], [-0.02, 0.06]]", "geometry.plate_corners_m 2 2 = nan: "),
-        ("plate_angle_deg = 50.0", "geometry.plate_angle_deg = 50.0: must be at most 45.0"),
         ("plate_width_m = 0.25", "geometry.flipper_length_m = 0.12: must be more than 0.125"),
     ],
 )  # fmt: skip

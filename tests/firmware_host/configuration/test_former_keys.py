@@ -1,13 +1,11 @@
 """Keys of version 0.1 are accepted under their former names, with a warning."""
 
 from operator import attrgetter
-from pathlib import Path
 
 import pytest
 
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import FORMER_KEYS, parse_configuration
-from firmware_host.daemon import main
 from simulation.harness.world import parse_world
 
 VALUES = {
@@ -43,12 +41,3 @@ def test_a_former_key_of_a_world_is_accepted_with_a_warning() -> None:
         "[[segment]]\nstart_m = 0.0\nend_m = 9.0\nwater_percent = 50.0\n[drives]\nrepeated_share = 0.1\n"
     )
     assert world.drive_changes == {"repeated_fraction": 0.1} and len(world.warnings) == 1
-
-
-def test_the_daemon_s_check_of_a_configuration_prints_the_warnings(
-    tmp_path: Path, example_text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "mudskipper.toml"
-    path.write_text(with_key(example_text, "log", "min_free_share = 0.1"), encoding="utf-8")
-    assert main(["--config", str(path), "--check-config"]) == 0
-    assert capsys.readouterr().err.startswith("mudskipperd: warning: log.min_free_share")
