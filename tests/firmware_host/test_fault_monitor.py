@@ -11,24 +11,20 @@ from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
 from control.monitors.motion_monitor import PROBED
 from control.rate import PERIOD_S
-from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, JointTarget, Phase, same_for_all
+from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, JointTarget, Phase, Torques, same_for_all
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
 from firmware_host.bus_monitor import REFUSED_TICKS, TROUBLE_S
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_monitor import (
-    ARMING_S,
-    POSE_FORGOTTEN_S,
-    FaultMonitor,
-    MonitorInput,
-)
+from firmware_host.fault_monitor import ARMING_S, POSE_FORGOTTEN_S, FaultMonitor, MonitorInput
 from firmware_host.log.recorder import HEALTHY
 from firmware_host.ticker import Tick
 from tests.control.synthetic_states import NO_TORQUE
 
 START_S = 100.0
+ADDUCTIONS = (1, 3)
 
 
 class HealthyDrives:
@@ -45,6 +41,10 @@ class HealthyDrives:
 
     def report(self, joint: int, **changes: Any) -> None:
         self.health[joint] = self.health[joint]._replace(**changes)
+
+
+def sent(torques_nm: Torques) -> LimitedTorques:
+    return LimitedTorques(torques_nm, limited=False, finite=True)
 
 
 class Bench:
@@ -70,8 +70,7 @@ class Bench:
     def tick(self, mode: Mode = Mode.HOLD, states: DriveStates | None = None, **changes: Any) -> list[Fault]:
         states = states or self.states()
         self.tick_number += 1
-        sent = LimitedTorques(NO_TORQUE, False, True)
-        monitor_input = MonitorInput(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
+        monitor_input = MonitorInput(mode, START_S, states, BodyPose(), sent(NO_TORQUE), False, 0.0, HEALTHY, "")
         return self.monitor.update(Tick(self.now_s, 0.0, self.tick_number, 0), monitor_input._replace(**changes))
 
 
@@ -91,14 +90,12 @@ def test_healthy_ticks_have_no_fault(bench: Bench, mode: Mode) -> None:
 
 
 @pytest.mark.parametrize("index", range(4))
-def test_a_fault_of_a_joint_names_that_joint(bench: Bench, index: int) -> None:
-    assert reported(bench.tick(states=bench.states(index, angle_rad=2.0))) == [("joint_position", JOINTS[index])]
-
-
-def test_joints_have_their_own_ranges(bench: Bench) -> None:
-    below = bench.tick(states=bench.states(0, angle_rad=-1.4)), bench.tick(states=bench.states(1, angle_rad=-1.4))
-    assert [reported(faults) for faults in below][0] == [("joint_position", "left_sweep")]
-    assert ("joint_position", "left_adduction") not in reported(below[1])
+@pytest.mark.parametrize(("angle_rad", "is_range_of"), [(2.0, ()), (-1.4, ADDUCTIONS)])
+def test_a_joint_beyond_its_own_range_is_named(
+    bench: Bench, index: int, angle_rad: float, is_range_of: tuple[int, ...]
+) -> None:
+    expected = [] if index in is_range_of else [("joint_position", JOINTS[index])]
+    assert reported(bench.tick(states=bench.states(index, angle_rad=angle_rad))) == expected
 
 
 def test_joints_are_not_monitored_before_all_drives_were_heard(bench: Bench) -> None:
@@ -138,6 +135,19 @@ def test_two_consecutive_ticks_of_lost_commands_are_no_fault(bench: Bench) -> No
         bench.ports["left"].failed_sends += tick % 3 > 0
         bench.ports["right"].failed_sends += tick % 3 == 0
         assert bench.tick() == []
+
+
+@pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
+def test_bus_warnings_end_without_error_frames_but_bus_off_stays(bench: Bench, state: BusState) -> None:
+    bench.ports["left"].state = state
+    for _ in range(int(TROUBLE_S / PERIOD_S) - 1):
+        assert bench.tick()
+    bench.tick()
+    assert bench.tick() == []
+    bench.ports["left"].error_frames += 1
+    assert bench.tick()
+    bench.ports["right"].state = BusState.OFF
+    assert all("bus_off" in [fault.name for fault in bench.tick()] for _ in range(1000))
 
 
 # drives
@@ -280,13 +290,13 @@ def test_a_joint_that_ignores_a_change_of_its_torque_gets_a_step(
     bench: Bench, wanted_nm: float, largest_nm: float, expected_nm: float
 ) -> None:
     for tick in range(18):
-        bench.tick(sent=LimitedTorques(Joints(0.0, 0.5 if tick > 9 else 0.0, 0.0, 0.0), False, True))
+        bench.tick(sent=sent(Joints(0.0, 0.5 if tick > 9 else 0.0, 0.0, 0.0)))
     probed = bench.monitor.with_probes(Joints(*[wanted_nm] * 4), largest_nm)
     assert probed == pytest.approx((wanted_nm, expected_nm, wanted_nm, wanted_nm))
 
 
 def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: Bench) -> None:
-    full = LimitedTorques(Joints(0.75, 0.0, 0.0, 0.0), False, True)
+    full = sent(Joints(0.75, 0.0, 0.0, 0.0))
 
     def ticks(mode: Mode, freeing: bool) -> list[Fault]:
         found: list[Fault] = []
@@ -314,19 +324,6 @@ def test_a_joint_may_lag_in_one_swing_of_a_walk_but_not_in_two_in_a_row(bench: B
     assert [swing(1.0, stride) for stride in (0, 2, 4, 5)] == [set(), set(), set(), everywhere]
     assert [swing(2.0, stride) for stride in (5, 7, 8)] == [set(), set(), everywhere]
     assert [swing(3.0, stride) for stride in (9, 10)] == [set(), everywhere]
-
-
-@pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
-def test_bus_warnings_end_without_error_frames_but_bus_off_stays(bench: Bench, state: BusState) -> None:
-    bench.ports["left"].state = state
-    for _ in range(int(TROUBLE_S / PERIOD_S) - 1):
-        assert bench.tick()
-    bench.tick()
-    assert bench.tick() == []
-    bench.ports["left"].error_frames += 1
-    assert bench.tick()
-    bench.ports["right"].state = BusState.OFF
-    assert all("bus_off" in [fault.name for fault in bench.tick()] for _ in range(1000))
 
 
 def test_a_calibrating_drive_blocks_arming_but_does_not_stop_a_walk(bench: Bench) -> None:

@@ -34,19 +34,24 @@ def make_segments(folder: Path, parameters: LogParameters = BY_TIME) -> LogSegme
     return LogSegments(first_path(folder, "run"), OPENING, parameters)
 
 
-def write_ticks(log: LogSegments, first: int, end: int) -> None:
-    for number in range(first, end, 19):
-        log.write(make_ticks(number, min(number + 19, end), Mode.WALKING))
+def write_ticks(log: LogSegments, first: int, end: int, rows_at_once: int = 19, mode: Mode = Mode.WALKING) -> None:
+    for number in range(first, end, rows_at_once):
+        log.write(make_ticks(number, min(number + rows_at_once, end), mode))
 
 
-def test_no_row_is_lost_or_doubled_at_a_border(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("rows_at_once", "files"), [(19, 4), (100, 5)])
+def test_segments_are_as_long_as_configured_and_no_row_is_lost_or_doubled_at_a_border(
+    tmp_path: Path, rows_at_once: int, files: int
+) -> None:
     log = make_segments(tmp_path)
-    write_ticks(log, 0, 1500)
+    write_ticks(log, 0, 1500, rows_at_once)
     assert log.close()
     paths = log_files(tmp_path, DONE)
-    assert [path.name for path in paths] == [f"run-{number:04d}.mcap" for number in range(4)]
+    assert [path.name for path in paths] == [f"run-{number:04d}.mcap" for number in range(files)]
     assert read_logs(paths).ticks["tick"].tolist() == list(range(1500))
     assert unfinished_files(tmp_path) == []
+    stamps_s = [read_log(path).ticks["stamp_s"] for path in paths]
+    assert max(each[-1] - each[0] for each in stamps_s) < BY_TIME.segment_s
 
 
 def test_a_segment_ends_by_its_size(tmp_path: Path) -> None:
@@ -56,15 +61,6 @@ def test_a_segment_ends_by_its_size(tmp_path: Path) -> None:
     assert log.close()
     assert len(log_files(tmp_path, DONE)) == 5
     assert all(path.stat().st_size < 200_000 for path in log_files(tmp_path, DONE))
-
-
-def test_no_segment_is_longer_than_configured(tmp_path: Path) -> None:
-    log = make_segments(tmp_path)
-    for number in range(0, 1500, 100):
-        log.write(make_ticks(number, number + 100, Mode.WALKING))
-    assert log.close()
-    stamps_s = [read_log(path).ticks["stamp_s"] for path in log_files(tmp_path, DONE)]
-    assert max(each[-1] - each[0] for each in stamps_s) < BY_TIME.segment_s
 
 
 def make_report(kind: str, trial: dict[str, str], tick: int = 0) -> tuple[int, bytes]:
@@ -79,8 +75,7 @@ def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_re
         log.write([*make_ticks(first, first + 10, Mode.HOLD), make_report(BEGUN, trial, first + 10)])
         write_ticks(log, first + 10, first + ticks)
         first += ticks
-    for number in range(first, first + 600, 100):
-        log.write(make_ticks(number, number + 100, Mode.IDLE))
+    write_ticks(log, first, first + 600, mode=Mode.IDLE)
     assert log.close()
     logs = [(path.stem, from_json(read_log(path).metadata.get("trial", ""))) for path in log_files(tmp_path, DONE)]
     named, letters, nothing, last = trials
