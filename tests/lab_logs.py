@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.lab.lab_csv import LabLog, read_lab_csv
+
 Columns = dict[str, NDArray[Any]]
 Change = Callable[[Columns], None]
 
@@ -55,3 +57,8 @@ def write_lab_log(path: Path, columns: Columns, settings: dict[str, str] = SETTI
     rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True)]
     path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
     return path
+
+
+def read_columns(folder: Path, columns: Columns, **options: Any) -> LabLog:
+    """Write the columns as a log in this folder and read it."""
+    return read_lab_csv(write_lab_log(folder / "run.csv", columns), **options)

@@ -1,6 +1,5 @@
 """A closed log takes a description without a change of its rows, and everything that reads logs knows it."""
 
-import resource
 import shutil
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from logs.recovery import recover_log
 from tests.command_line.command_lines import run
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.folders import ROOT
+from tests.full_disk import files_of_at_most
 
 WALK = ROOT / "tests/fixtures/walk_0_1.mcap"
 TRIAL = {"mud": "A", "water": "49.5", "tags": "wet, warm", "plate": "flat"}
@@ -71,14 +71,9 @@ def test_a_power_cut_in_the_middle_costs_no_row(log: Path, step: int) -> None:
 
 
 def test_a_full_disk_leaves_the_log_as_it_was(log: Path) -> None:
-    """The kernel limits the size of files for a while."""
-    before, unlimited = log.read_bytes(), resource.RLIM_INFINITY
-    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, unlimited))
-    try:
-        with pytest.raises(OSError, match="File too large"):
-            annotate(log, TRIAL)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (unlimited, unlimited))
+    before = log.read_bytes()
+    with files_of_at_most(len(before) + 10), pytest.raises(OSError, match="File too large"):
+        annotate(log, TRIAL)
     assert log.read_bytes() == before
 
 

@@ -10,7 +10,6 @@ from control.modes import Mode
 from control.records import FLIPPERS, JOINTS
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.loop_events import LoopEvents
 from logs.fault_history import read_buses, read_causes
@@ -18,6 +17,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.recorded_events import EventRecorder
+from verification.faults.failing_robot import RowList
 
 TEXT = "\n".join(f'[drive.{joint}]\nbus = "{joint.partition("_")[0]}"' for joint in JOINTS)
 SUBJECTS = {
@@ -67,18 +67,8 @@ def test_what_a_drive_reports_soon_after_its_start_was_no_fault() -> None:
     assert len(read_causes(events(heard, *["nothing"] * 3, unknown, over), TEXT)) == 1
 
 
-class StampedEvents(NullRecorder):
-    def __init__(self) -> None:
-        self.events: list[dict[str, Any]] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        if kind_index == EVENT_KIND:
-            self.events.append(EVENT.decode(payload))
-        return True
-
-
 def test_a_bus_that_fails_in_a_walk_is_one_cause(configuration: Configuration) -> None:
-    recorder = StampedEvents()
+    recorder = RowList()
     track = Track([(2.0, MUDS["48.5"])])
     robot = Lockstep(configuration, track, recorder=recorder, failures=Failures(configuration.bus))
     robot.arm()
@@ -86,7 +76,8 @@ def test_a_bus_that_fails_in_a_walk_is_one_cause(configuration: Configuration) -
     robot.run_for(0.5)
     robot.fail("bus.left", "off")
     robot.run_for(1.0)
-    causes = read_causes(recorder.events, configuration.text)
+    reported = [EVENT.decode(row) for number, row in recorder.rows if number == EVENT_KIND]
+    causes = read_causes(reported, configuration.text)
     (bus,) = [cause for cause in causes if cause.name == "bus_refuses"]
     assert bus.subjects == ("left",) and "drive_silent" in bus.consequences
     assert not {"drive_silent", "drive_quiet", "drive_late"} & {cause.name for cause in causes}

@@ -1,8 +1,5 @@
 """A Parquet export has every value of a log's rows, one number or word per cell, with units."""
 
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -20,22 +17,12 @@ from logs.files.log_reader import Log, read_log
 from logs.flat_columns import flat_columns, stack_rows
 from logs.parquet import write_parquet
 from tests.folders import ROOT
+from tests.full_disk import files_of_at_most
 
 
 @pytest.fixture(scope="module")
 def log() -> Log:
     return read_log(ROOT / "tests/fixtures/walk_0_1.mcap")
-
-
-@contextmanager
-def files_of_at_most(size: int) -> Iterator[None]:
-    """Limit the size of files, so that a write fails as on a full disk."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_every_value_of_the_log_is_in_a_table(log: Log, tmp_path: Path) -> None:

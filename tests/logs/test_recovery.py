@@ -269,16 +269,6 @@ def test_a_finished_log_of_the_same_name_with_fewer_rows_takes_nothing_away(tmp_
     assert path.exists() and len(read_log(other).ticks) == CHUNK
 
 
-def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
-    path = make_file(tmp_path / "run.mcap").finish()
-    contents = bytearray(path.read_bytes())
-    contents[contents.rfind(b"/tick") - 17] += 1  # makes a message of a channel in the summary
-    path.write_bytes(contents)
-    with pytest.raises(LogError, match="damaged"):
-        read_log(path)
-    assert recover_log(path).rows == 5 * CHUNK
-
-
 def test_a_log_that_is_cut_off_during_its_recovery_stays_for_another_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

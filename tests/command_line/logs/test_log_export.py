@@ -16,7 +16,7 @@ from logs.files.log_reader import read_log
 from logs.files.scanned_log import ScannedLog, scan_logs
 from tests.command_line.command_lines import failure, refusal
 from tests.folders import ROOT
-from tests.logs.test_parquet import files_of_at_most
+from tests.full_disk import files_of_at_most
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
 FORMS = {"--csv": "walk.csv", "--parquet": "tables"}

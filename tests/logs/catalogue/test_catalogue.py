@@ -20,7 +20,7 @@ from logs.files.log_reader import read_log
 from logs.files.stored_logs import preserve
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
-from tests.logs.test_parquet import files_of_at_most
+from tests.full_disk import files_of_at_most
 
 WALK = ROOT / "tests/fixtures/walk_0_1.mcap"
 
@@ -173,26 +173,30 @@ def test_broken_logs_are_read_again_on_demand(folder: Path, readings: list[str])
     assert readings == ["text.mcap"]
 
 
+def write_catalogue(path: Path, version: object) -> None:
+    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{version}'}})")
+
+
 def test_a_catalogue_of_a_newer_version_is_refused_and_left(folder: Path) -> None:
     path = catalogue_path(folder)
-    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
+    write_catalogue(path, VERSION + 1)
     before = path.read_bytes()
     with pytest.raises(CatalogueError, match="update mudskipper"):
         Catalogue(folder)
     assert path.read_bytes() == before
 
 
-def test_a_catalogue_whose_version_is_no_number_of_ours_is_made_again(folder: Path) -> None:
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(b"PAR1 garbage PAR1"),
+        lambda path: write_catalogue(path, "9" * 5000),  # no version of ours
+    ],
+)
+def test_a_damaged_catalogue_is_made_again(folder: Path, damage: Callable[[Path], object]) -> None:
     known = updated(folder)
-    version, path = "9" * 5000, catalogue_path(folder)
-    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{version}'}})")
-    assert updated(folder) == known
-
-
-@pytest.mark.parametrize("contents", [b"", b"PAR1 garbage PAR1"])
-def test_a_damaged_catalogue_is_made_again(folder: Path, contents: bytes) -> None:
-    known = updated(folder)
-    catalogue_path(folder).write_bytes(contents)
+    damage(catalogue_path(folder))
     assert updated(folder) == known == updated(folder)
 
 

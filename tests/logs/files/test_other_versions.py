@@ -12,6 +12,7 @@ from command_line import main
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import ROW_KINDS, STRIDE, TICK
 from firmware_host.log.schema import RowKind, read_definition
+from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log, read_logs
 from logs.files.log_summary import log_summary
 from logs.recovery import recover_log
@@ -113,6 +114,8 @@ def test_every_row_of_another_version_is_read_and_recovered_in_its_own_layout(
         contents = bytearray(path.read_bytes())
         contents[contents.rfind(b"/tick") - 17] += 1  # makes a message of a record in the summary
         path.write_bytes(contents)
+        with pytest.raises(LogError, match="damaged"):
+            read_log(path)
     recovered = recover_log(path)
     log = read_log(recovered.path)
     assert (recovered.rows, recovered.lost, log.complete) == (302, 0, True)

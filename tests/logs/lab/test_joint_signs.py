@@ -10,7 +10,7 @@ from control.records import Phase
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import LabLog, read_lab_csv
 from tests.folders import SHARED_DATA
-from tests.lab_logs import JOINTS, lab_columns, write_lab_log
+from tests.lab_logs import JOINTS, lab_columns, read_columns
 
 AIR = sorted([*SHARED_DATA.glob("as_published/Test_Mon_*"), *SHARED_DATA.glob("as_published/_Mon_Aug_*")])
 
@@ -21,7 +21,7 @@ def kinds(log: LabLog) -> list[FindingKind]:
 
 @cache
 def straight_log(folder: Path, mud: bool) -> LabLog:
-    return read_lab_csv(write_lab_log(folder / f"straight-{mud}.csv", lab_columns(mud=mud)))
+    return read_columns(folder, lab_columns(mud=mud))
 
 
 @pytest.mark.parametrize("mud", [True, False], ids=["mud", "air"])
@@ -35,7 +35,7 @@ def test_inverted_signals_are_inverted_back(
     columns = lab_columns(mud=mud)
     for signal, sign in zip(("pos", "curr"), inverted, strict=True):
         columns[f"{JOINTS[joint]}_{signal}"] *= sign
-    log = read_lab_csv(write_lab_log(tmp_path / "inverted.csv", columns))
+    log = read_columns(tmp_path, columns)
     np.testing.assert_allclose(log.angle_rad, straight.angle_rad)
     np.testing.assert_allclose(log.current_a, straight.current_a)
     swing = straight.current_a[straight.phase == Phase.SWING]
@@ -51,7 +51,7 @@ def test_a_stroke_with_the_wrong_sign_is_left_out_and_named(tmp_path: Path) -> N
     stances = np.flatnonzero(np.diff((columns["turtle_state"] == 3).astype(int)) == 1) + 1
     second = slice(stances[1], stances[1] + 200)
     columns["rightsweeping_curr"][second] *= -1.0
-    log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
+    log = read_columns(tmp_path, columns)
     (finding,) = log.findings
     assert (finding.kind, finding.column) == (FindingKind.SIGN, "rightsweeping_curr")
     assert finding.time_s == columns["time"][second][0] and finding.line == second.start + 4
@@ -65,7 +65,7 @@ def test_an_arm_of_negative_weight_is_reported(tmp_path: Path) -> None:
     columns = lab_columns()
     raised = np.isin(columns["turtle_state"], (0, 1))
     columns["leftadduction_curr"][raised] *= -1.0
-    log = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns))
+    log = read_columns(tmp_path, columns)
     (finding,) = log.findings
     assert (finding.kind, finding.column) == (FindingKind.SIGN, "leftadduction_curr")
     assert "negative weight" in finding.text
@@ -75,7 +75,7 @@ def test_a_flipper_held_by_mud_in_most_swings_is_in_mud(tmp_path: Path) -> None:
     columns = lab_columns(strides=4)
     swings = np.flatnonzero(columns["turtle_state"] == 1)
     columns["leftsweeping_curr"][swings[swings > 500]] += 8.0
-    assert FindingKind.NO_MUD not in kinds(read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns)))
+    assert FindingKind.NO_MUD not in kinds(read_columns(tmp_path, columns))
 
 
 @pytest.mark.skipif(not AIR, reason="the shared measurements are not here")

@@ -10,9 +10,8 @@ import pytest
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_error import LogError
 from logs.lab.findings import FindingKind
-from logs.lab.lab_csv import read_lab_csv
 from logs.replay import replay_files
-from tests.lab_logs import JOINTS, Change, Columns, lab_columns, write_lab_log
+from tests.lab_logs import JOINTS, Change, Columns, lab_columns, read_columns, write_lab_log
 
 
 def scaled(factor: float, part: str = "") -> Change:
@@ -79,7 +78,7 @@ def test_the_zero_is_that_of_the_configured_geometry(configuration: Configuratio
 def test_a_single_wild_sample_is_left_out(tmp_path: Path) -> None:
     columns = lab_columns()
     columns["rightsweeping_pos"][500] = 7.0
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     assert np.flatnonzero(np.isnan(log.angle_rad[:, 2])).tolist() == [500]
     (finding,) = log.findings
     assert finding[:4] == (FindingKind.RANGE, "rightsweeping_pos", 2.5, 504)
@@ -89,7 +88,7 @@ def test_a_single_wild_sample_is_left_out(tmp_path: Path) -> None:
 def test_a_signal_that_hangs_is_left_out_there_alone(column: str, tmp_path: Path) -> None:
     columns = lab_columns()
     columns[column][560:660] = columns[column][560]
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     signal = log.current_a if column.endswith("curr") else log.angle_rad
     assert np.flatnonzero(np.isnan(signal[:, 2])).tolist() == list(range(560, 660))
     assert np.count_nonzero(np.isnan(log.current_a)) + np.count_nonzero(np.isnan(log.angle_rad)) == 100
@@ -101,7 +100,7 @@ def test_a_joint_whose_both_signals_hang_is_left_out(tmp_path: Path) -> None:
     columns = lab_columns()
     for signal in ("pos", "curr"):
         columns[f"leftsweeping_{signal}"][520:660] = columns[f"leftsweeping_{signal}"][520]
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     assert {finding.column for finding in log.findings} == {"leftsweeping_pos", "leftsweeping_curr"}
     assert np.count_nonzero(np.isnan(log.current_a)) == 140
 
@@ -129,7 +128,7 @@ def missing(columns: Columns) -> None:
 def test_a_good_log_has_no_findings(change: Change, tmp_path: Path) -> None:
     columns = lab_columns()
     change(columns)
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     assert log.findings == () and not np.isnan(log.angle_rad).any()
 
 
@@ -137,14 +136,14 @@ def test_a_flipper_that_hangs_idle_is_absent_though_its_encoder_flickers(tmp_pat
     columns = lab_columns()
     for joint in JOINTS[:2]:
         columns[f"{joint}_pos"] = 0.02 + np.resize([0.0, 3e-6], len(columns["time"]))
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     assert log.flippers == ("right",) and np.isnan(log.angle_rad[:, :2]).all()
 
 
 def test_a_flipper_without_one_of_its_columns_is_reported(tmp_path: Path) -> None:
     columns = lab_columns()
     del columns["rightadduction_pos"]
-    findings = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns)).findings
+    findings = read_columns(tmp_path, columns).findings
     assert [str(f) for f in findings] == [
         "there is no column rightadduction_pos, so the right flipper has no coefficients"
     ]
@@ -155,16 +154,16 @@ def test_the_limit_and_the_zero_are_found_at_any_rate_of_rows(every: int, tmp_pa
     columns = lab_columns()
     saturated(columns)
     columns = {name: values[::every] for name, values in columns.items()}
-    assert read_lab_csv(write_lab_log(tmp_path / "run.csv", columns)).current_limit_a == 6.0
+    assert read_columns(tmp_path, columns).current_limit_a == 6.0
     shifted(-0.05)(columns)
     with pytest.raises(LogError, match="below the surface in every swing"):
-        read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+        read_columns(tmp_path, columns)
 
 
 def test_a_depth_beyond_the_command_is_reported(tmp_path: Path) -> None:
     columns = lab_columns()
     columns["insertiondepth"] = np.full(len(columns["time"]), 0.005)
-    findings = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns)).findings
+    findings = read_columns(tmp_path, columns).findings
     assert {finding.kind for finding in findings} == {FindingKind.DEPTH}
     assert [finding.column for finding in findings] == ["leftadduction_pos", "rightadduction_pos"]
 
@@ -174,6 +173,6 @@ def test_a_swing_higher_than_the_set_height_leaves_the_joint_out(tmp_path: Path)
     for joint in ("left", "right"):
         columns[f"{joint}adduction_pos"] = columns[f"{joint}adduction_pos"] * 1.6
     columns["rightadduction_pos"] += 0.05
-    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns))
+    log = read_columns(tmp_path, columns)
     assert np.isnan(log.angle_rad[:, 3]).all() and not np.isnan(log.angle_rad[:, 1]).any()
     assert any(f.kind is FindingKind.DEPTH and f.column == "rightadduction_pos" for f in log.findings)
