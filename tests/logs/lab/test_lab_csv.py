@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from control.records import JOINTS, Phase
 from logs.files.log_error import LogError
-from logs.files.log_reader import Log
-from logs.files.tick_array import tick_type
+from logs.files.log_reader import Log, read_log
 from logs.lab.export import write_lab_csv
 from logs.lab.findings import FindingKind
 from logs.lab.lab_csv import LabLog, read_lab_csv
 from logs.replay import replay_files
-from tests.folders import SHARED_DATA
+from tests.folders import ROOT, SHARED_DATA
 from tests.lab_logs import JOINTS as LAB_JOINTS
 from tests.lab_logs import lab_columns, write_lab_log
 
@@ -67,31 +66,13 @@ def write(path: Path, *lines: str) -> Path:
     return path
 
 
-def make_walk(strides: int = 3, rate_hz: float = 100.0) -> Log:
-    """Return a log of this project in which both flippers walk in mud: down, back, up and forward, against a load."""
-    pose = {  # sweep and adduction in rad at the end of each phase of one second
-        Phase.REST: (0.0, 0.1),
-        Phase.PAUSE: (0.5, 0.1),
-        Phase.INSERTION: (0.5, -0.3),
-        Phase.STANCE: (-0.5, -0.3),
-        Phase.EXTRACTION: (-0.5, 0.1),
-        Phase.SWING: (0.5, 0.1),
-    }
-    cycle = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
-    phases = [Phase.REST, Phase.PAUSE, *cycle * strides]
-    corners = np.array([pose[Phase.REST], *(pose[phase] for phase in phases)])
-    time_s = np.arange(len(phases) * rate_hz) / rate_hz
-    angles = [np.interp(time_s, np.arange(len(corners)), corners[:, part]) for part in (0, 1)]
-    ticks = np.zeros(len(time_s), tick_type())
-    ticks["stamp_s"] = 1234.5 + time_s
-    ticks["phase"] = np.repeat(phases, int(rate_hz))
-    noise = np.random.default_rng(3).normal(0.0, 1e-5, (2, len(time_s), 4))
-    moving = np.gradient(np.column_stack([*angles, *angles]), axis=0)
-    ticks["angle_rad"] = np.column_stack([*angles, *angles]) + noise[0]
-    ticks["current_a"] = 3.0 * np.sign(moving) + 0.5 + noise[1]
-    ticks["stride_depth_m"] = 0.035
-    ticks["body_x_m"] = np.cumsum(ticks["phase"] == Phase.STANCE) * 1e-4
-    return Log({}, "[gait]\nsweep_angle_deg = 30.0\nprotocol = 'walking'\n", ticks, [], [], True)
+@pytest.fixture
+def walk() -> Log:
+    """Return a log of this project, in which both flippers walk after a rest and a pause."""
+    log = read_log(ROOT / "tests/fixtures/walk_0_1.mcap")
+    assert set(log.ticks["phase"][:100]) == {Phase.REST}
+    log.ticks["phase"][50:100] = Phase.PAUSE
+    return log
 
 
 def export(log: Log) -> str:
@@ -128,40 +109,38 @@ def test_most_measured_walks_of_january_sink_further_than_they_advance() -> None
     assert all(any(finding.kind is FindingKind.POSE for finding in log.findings) for log in logs)
 
 
-def test_an_exported_log_is_read_back(tmp_path: Path) -> None:
-    walk = make_walk()
-    log = read_lab_csv(write(tmp_path / "walk.csv", export(walk)))
-    assert log.gait == {"insertion_angle": 0.035, "sweep_angle_deg": 30.0}  # the settings that are numbers
-    assert log.phase.tolist() == walk.ticks["phase"].tolist()
-    assert log.flippers == ("left", "right") and set(log.commanded_depth_m.tolist()) == {0.035}
-    np.testing.assert_allclose(log.stamp_s, walk.ticks["stamp_s"] - 1234.5, atol=1e-9)
-    np.testing.assert_allclose(log.angle_rad, walk.ticks["angle_rad"], rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(log.current_a, walk.ticks["current_a"], rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(log.body_x_m, walk.ticks["body_x_m"], rtol=1e-8, atol=1e-12)
+def test_an_exported_log_is_read_back(walk: Log, tmp_path: Path) -> None:
+    log, ticks = read_lab_csv(write(tmp_path / "walk.csv", export(walk))), walk.ticks
+    assert log.gait == {"insertion_angle": 0.03, "sweep_angle_deg": 30.0, "swing_duration_s": 0.8}  # that are numbers
+    assert log.phase.tolist() == ticks["phase"].tolist()
+    assert log.flippers == ("left", "right") and log.commanded_depth_m.tolist() == ticks["stride_depth_m"].tolist()
+    np.testing.assert_allclose(log.stamp_s, ticks["stamp_s"] - ticks["stamp_s"][0], atol=1e-8)
+    np.testing.assert_allclose(log.angle_rad, ticks["angle_rad"], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(log.current_a, ticks["current_a"], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(log.body_x_m, ticks["body_x_m"], rtol=1e-8, atol=1e-12)
 
 
-def test_writing_keeps_the_authors_columns_and_units() -> None:
-    settings, values, names, first, *_ = export(make_walk()).splitlines()
-    assert settings == "scenario,insertion_angle,sweep_angle_deg" and values == "mudskipper,0.035,30.0"
+def test_writing_keeps_the_authors_columns_and_units(walk: Log) -> None:
+    settings, values, names, first, *_ = export(walk).splitlines()
+    assert settings == "scenario,insertion_angle,sweep_angle_deg,swing_duration_s"
+    assert values == "mudskipper,0.03,30.0,0.8"
     assert names == HEAD.splitlines()[1] + ",insertiondepth,OptitrackPosition_x"
     turns = [float(field) for field in first.split(",")[2:6]]
-    assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0], abs=1e-5)
+    assert turns == pytest.approx([-0.1246 / math.tau, 0.0, -0.1246 / math.tau, 0.0], abs=1e-5)
 
 
-def test_a_log_without_a_pose_has_no_column_for_it() -> None:
-    walk = make_walk()
+def test_a_log_without_a_pose_has_no_column_for_it(walk: Log) -> None:
     walk.ticks["body_x_m"] = math.nan
     assert "Optitrack" not in export(walk)
 
 
-def test_an_empty_log_is_written_as_a_head() -> None:
-    walk = make_walk()
+def test_an_empty_log_is_written_as_a_head(walk: Log) -> None:
     assert export(walk._replace(ticks=walk.ticks[:0])).count("\n") == 3
 
 
-def test_a_configuration_that_is_not_toml_is_refused() -> None:
+def test_a_configuration_that_is_not_toml_is_refused(walk: Log) -> None:
     with pytest.raises(LogError, match="the configuration in the log is not TOML"):
-        export(make_walk()._replace(configuration_text="[gait"))
+        export(walk._replace(configuration_text="[gait"))
 
 
 def test_states_become_phases(tmp_path: Path) -> None:
