@@ -24,33 +24,11 @@ ALL = 1000
 NONE = 0  # no unit until the next insertion needs the choice, as in a swing that is shorter than the work
 
 
-@cache
-def walked(units_per_tick: int) -> Direct:
-    configuration = parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
-    robot = Direct(configuration, paper_track(), seed=5)
-    robot.loop.learning.units_per_tick = units_per_tick
-    robot.arm()
-    robot.walk(WalkOrder(0.04, True, STRIDES))
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    return robot
-
-
-@pytest.mark.parametrize("units_per_tick", [NONE, ALL])
-def test_estimates_depths_and_walk_do_not_depend_on_the_units_per_tick(units_per_tick: int) -> None:
-    one, other = walked(1).loop.learning, walked(units_per_tick).loop.learning
-    assert len(one.strides) == 2 * STRIDES
-    assert repr(one.strides) == repr(other.strides)
-    assert repr(one.estimator.mud_estimate) == repr(other.estimator.mud_estimate)
-    assert repr(one.estimator.map.rows()) == repr(other.estimator.map.rows())
-    assert repr(walked(1).loop.states) == repr(walked(units_per_tick).loop.states)
-    assert walked(1).robot.plant.body_m == walked(units_per_tick).robot.plant.body_m
-
-
 class Watched:
     """Counts the units of each tick, and what is finished at once."""
 
     def __init__(self, robot: Direct) -> None:
-        self.work = robot.loop.learning.estimator.work
+        self.robot, self.work = robot, robot.loop.learning.estimator.work
         self.units: list[int] = []
         self.at_once = 0
         self._run, self._finish = self.work.run, self.work.finish
@@ -65,13 +43,33 @@ class Watched:
         self._finish()
 
 
-def test_no_tick_of_a_walk_runs_more_than_one_unit(configuration: Configuration) -> None:
+@cache
+def walked(units_per_tick: int) -> Watched:
+    configuration = parse_configuration(calibrated(EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")))
     robot = Direct(configuration, paper_track(), seed=5)
+    robot.loop.learning.units_per_tick = units_per_tick
     robot.arm()
     watched = Watched(robot)
-    robot.walk(WalkOrder(0.03, True, 2))
+    robot.walk(WalkOrder(0.04, True, STRIDES))
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
-    assert robot.loop.learning.strides_closed == 4
+    return watched
+
+
+@pytest.mark.parametrize("units_per_tick", [NONE, ALL])
+def test_estimates_depths_and_walk_do_not_depend_on_the_units_per_tick(units_per_tick: int) -> None:
+    robots = [walked(units).robot for units in (1, units_per_tick)]
+    one, other = (robot.loop.learning for robot in robots)
+    assert len(one.strides) == 2 * STRIDES
+    assert repr(one.strides) == repr(other.strides)
+    assert repr(one.estimator.mud_estimate) == repr(other.estimator.mud_estimate)
+    assert repr(one.estimator.map.rows()) == repr(other.estimator.map.rows())
+    assert repr(robots[0].loop.states) == repr(robots[1].loop.states)
+    assert robots[0].robot.plant.body_m == robots[1].robot.plant.body_m
+
+
+def test_no_tick_of_a_walk_runs_more_than_one_unit() -> None:
+    watched = walked(1)
+    assert watched.robot.loop.learning.strides_closed == 2 * STRIDES
     assert set(watched.units) == {1}
     assert watched.at_once == 0
 
