@@ -140,15 +140,13 @@ def test_a_loop_that_misses_most_ticks_does_not_feed_the_watchdog(missed: int, f
 
 
 def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
-    robot: RecordedRobot, short_folder: Path, monkeypatch: pytest.MonkeyPatch
+    robot: RecordedRobot, served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    served = Served(short_folder / "s")
     monkeypatch.setattr("firmware_host.daemon.time.monotonic", iter((1.0, 1.002)).__next__)
     serve(robot.loop, served, robot.now_s)
     monkeypatch.undo()
     robot.step()
     assert robot.loop.timing.tick.max_us == pytest.approx(2000.0, abs=1.0)
-    served.close()
 
 
 def test_a_daemon_prints_where_it_is_operated_and_protects_a_lease_until_its_holder_leaves(short_folder: Path) -> None:

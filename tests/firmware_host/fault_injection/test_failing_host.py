@@ -13,9 +13,9 @@ from firmware_host.fault_injection.failing_host import (
     FailingTicker,
 )
 from firmware_host.log.recorder import HEALTHY, LogReport
-from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.ticker import Tick, Ticker
 from tests.firmware_host.synthetic_clock import SyntheticClock
+from tests.firmware_host.synthetic_rows import make_event
 from tests.recorded_events import EventRecorder
 
 
@@ -104,7 +104,7 @@ def failing_log() -> tuple[KeepingRecorder, Failures, FailingRecorder]:
 
 
 def put_numbers(recorder: FailingRecorder, numbers: range) -> list[bool]:
-    return [recorder.put(EVENT_KIND, EVENT.encode(float(number), str(number))) for number in numbers]
+    return [recorder.put(*make_event(str(number), float(number))) for number in numbers]
 
 
 @pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True)])

@@ -12,10 +12,10 @@ import pytest
 
 from firmware_host.configuration.toml_records import LARGEST_FILE_BYTES
 from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets
-from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 from firmware_host.sockets.rights import Group, Peer, Rights
 from operator_client.live_rows import LiveRows
 from operator_client.status_client import NoDaemonError, NotPermittedError
+from tests.firmware_host.synthetic_rows import make_event, make_tick, make_ticks
 
 OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
 RIGHTS_OF_OTHERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)
@@ -32,10 +32,6 @@ def stream(path: Path) -> Iterator[RowStream]:
     assert made.problem == ""
     yield made
     made.close()
-
-
-def tick(number: int) -> tuple[int, bytes]:
-    return TICK_KIND, TICK.encode_named(stamp_s=0.1 * number, tick=number)
 
 
 def subscribe(stream: RowStream, path: Path) -> LiveRows:
@@ -56,7 +52,7 @@ def received(rows: LiveRows) -> list[int]:
 
 def test_every_subscriber_gets_every_row_with_its_values(stream: RowStream, path: Path) -> None:
     first, second = subscribe(stream, path), subscribe(stream, path)
-    stream.publish([tick(1), (EVENT_KIND, EVENT.encode(0.2, "walk")), tick(2)])
+    stream.publish([make_tick(1), make_event("walk", 0.2), make_tick(2)])
     for subscriber in (first, second):
         rows = subscriber.read(1.0)
         assert [row.kind.topic for row in rows] == ["/tick", "/event", "/tick"]
@@ -74,24 +70,24 @@ def test_a_subscriber_that_hangs_loses_its_own_rows_and_learns_how_many(stream: 
     reading, hanging = subscribe(stream, path), subscribe(stream, path)
     got: list[int] = []
     for number in range(3000):
-        stream.publish([tick(number)])
+        stream.publish([make_tick(number)])
         if number % 100 == 99:
             got += received(reading)
     assert got == list(range(3000)) and reading.lost == 0
     late = received(hanging)
-    stream.publish([tick(3000)])
+    stream.publish([make_tick(3000)])
     late += received(hanging)
     assert late[-1] == 3000 and hanging.lost > 0
     assert len(late) + hanging.lost == 3001
-    stream.publish([tick(3001)])
+    stream.publish([make_tick(3001)])
     assert received(hanging) == [3001] and len(late) + hanging.lost == 3001  # each loss is sent once
 
 
 def test_a_subscriber_that_leaves_costs_the_others_nothing(stream: RowStream, path: Path) -> None:
     leaving, staying = subscribe(stream, path), subscribe(stream, path)
     leaving.close()
-    stream.publish([tick(1)])
-    stream.publish([tick(2)])
+    stream.publish([make_tick(1)])
+    stream.publish([make_tick(2)])
     assert received(staying) == [1, 2]
 
 
@@ -110,7 +106,7 @@ def test_silent_readers_leave_places_for_operators_and_one_too_many_is_refused_i
     places += [subscribe(stream, path) for _ in range(2)]
     with pytest.raises(NoDaemonError, match="all 8 places for the level drive are taken"):
         subscribe(stream, path)
-    stream.publish([tick(1)])
+    stream.publish([make_tick(1)])
     assert received(places[-1]) == [1]
     stream.close()
 
@@ -132,7 +128,6 @@ def test_the_socket_of_an_earlier_daemon_s_writer_that_hangs_is_replaced(path: P
 
 
 def test_a_packet_is_never_longer_than_its_bound() -> None:
-    rows = [tick(number) for number in range(200)]
-    made = packets(rows)
+    made = packets(make_ticks(0, 200))
     assert all(len(packet) <= PACKET_BYTES for packet, _ in made)
     assert sum(count for _, count in made) == 200

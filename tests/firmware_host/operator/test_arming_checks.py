@@ -12,22 +12,20 @@ from control.records import JOINTS, Joints
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.sockets.socket_methods import METHODS
-from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
+from tests.firmware_host.recorded_robot import RecordedRobot
 
 SUBJECTS = {"drive": "left_sweep", "watchdog": "left_sweep", "joint": "left_sweep", "bus": "left", "flipper": "right"}
 
 
 @pytest.fixture(scope="module")
-def ready(configuration: Configuration) -> Lockstep:
+def ready(configuration: Configuration) -> RecordedRobot:
     """Return a robot that may be armed; tests add and remove faults."""
-    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    robot = RecordedRobot(configuration)
     robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.present, 3.0)
     return robot
 
 
-def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> dict[str, dict[str, Any]]:
+def lines_of(robot: RecordedRobot, *names: str, warnings: tuple[str, ...] = ()) -> dict[str, dict[str, Any]]:
     """Return the lines of a robot with only these faults."""
     faults = [FAULT_KINDS[name].fault(SUBJECTS.get(FAULT_KINDS[name].part, "")) for name in names]
     robot.loop.faults.reset()
@@ -39,7 +37,7 @@ def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> di
     return lines
 
 
-def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_line_of_a_ready_robot_is_ok(ready: RecordedRobot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ready.loop, "states", Joints(*(state._replace(angle_rad=0.5) for state in ready.loop.states)))
     lines = lines_of(ready)
     assert all(item["ok"] and not item["fix"] for item in lines.values())
@@ -52,7 +50,7 @@ def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep, monkeypatch: pytest.
     assert "380" in lines["loop"]["text"]
 
 
-def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> None:
+def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: RecordedRobot) -> None:
     for kind in FaultKind:
         fault = kind.fault(SUBJECTS.get(kind.part, ""))
         lines = lines_of(ready, kind)
@@ -65,7 +63,7 @@ def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> Non
 
 
 @pytest.mark.parametrize("by_force", [False, True])
-def test_the_check_and_a_refused_arm_agree(ready: Lockstep, by_force: bool) -> None:
+def test_the_check_and_a_refused_arm_agree(ready: RecordedRobot, by_force: bool) -> None:
     loop = ready.loop
     for kind in FaultKind:
         fault = kind.fault(SUBJECTS.get(kind.part, ""))
@@ -81,7 +79,7 @@ def test_the_check_and_a_refused_arm_agree(ready: Lockstep, by_force: bool) -> N
         assert fault.message in (refused or "") if against else refused is None
 
 
-def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) -> None:
+def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: RecordedRobot) -> None:
     line = lines_of(ready, "drive_late", "drive_silent", "drive_version", "heartbeat_silent")["drive.left_sweep"]
     blocking = [
         kind.fault("left_sweep")
@@ -91,14 +89,14 @@ def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) 
     assert line["fix"] == "; ".join(fault.kind.what_to_do for fault in blocking[:2])
 
 
-def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) -> None:
+def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: RecordedRobot) -> None:
     line = lines_of(ready, warnings=("no real-time priority",))["realtime"]
     assert (line["ok"], line["warning"], line["text"]) == (True, True, "no real-time priority")
     assert line.keys() == METHODS["check"].answer_keys.keys() and not line["mandatory"]
 
 
 def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    robot = RecordedRobot(configuration)
     silent = robot.robot.drives[2]
     silent.cyclic_frames = lambda now_s: iter(())  # type: ignore[method-assign]
     robot.run_for(0.5)
@@ -116,7 +114,7 @@ def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configura
 def test_a_drive_without_temperature_is_reported_but_does_not_block_arming(
     configuration: Configuration, sent: float | None
 ) -> None:
-    robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
+    robot = RecordedRobot(configuration)
     for drive in robot.robot.drives:
         everything = drive.cyclic_frames
         drive.cyclic_frames = lambda now_s, everything=everything: (  # type: ignore[method-assign, misc]
