@@ -131,9 +131,16 @@ def cut_supply(bench: Bench, frame: int) -> None:
     bench.bus.at_frame = (frame, lambda: bench.device.restart(bench.bus.now_s))
 
 
+def dip_supply(bench: Bench, frame: int) -> None:
+    """Let the drive restart after a frame, and answer the next one already."""
+    bench.device.boot_s = 0.0
+    cut_supply(bench, frame)
+
+
 @each_type
 @pytest.mark.parametrize(
-    ("fail", "outcomes"), [(unplug, {Outcome.OLD_AFTER_RESTART, Outcome.UNKNOWN}), (cut_supply, set())]
+    ("fail", "outcomes"),
+    [(unplug, {Outcome.OLD_AFTER_RESTART, Outcome.UNKNOWN}), (cut_supply, set()), (dip_supply, set())],
 )
 def test_a_cable_or_a_supply_that_fails_at_any_frame_leaves_the_old_or_the_new_settings(
     name: str, fail: Callable[[Bench, int], None], outcomes: set[Outcome]
