@@ -26,7 +26,7 @@ from drivers.odrive.parameters import OdriveParameters
 DRIVES = {joint: OdriveParameters("left" if node < 2 else "right", node) for node, joint in enumerate(JOINTS)}
 NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}
 PERIOD_S = 0.0025
-BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.7
+BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.55
 LEFT_JOINTS = JOINTS[:2]
 REPORTED = (
     codec.GET_ENCODER_ESTIMATES,
