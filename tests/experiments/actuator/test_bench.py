@@ -27,6 +27,7 @@ class HoldingRobot(StillRobot):
     def __init__(self, trouble: BenchError | None = None) -> None:
         super().__init__("hold")
         self.trouble = trouble
+        self.waited_in: set[str] = set()  # modes
 
     def call(self, method: str, **params: Any) -> Any:
         if self.trouble:
@@ -36,7 +37,7 @@ class HoldingRobot(StillRobot):
         return {"mode": self.mode, "faults": [], "now_s": self.now_s}
 
     def wait(self, duration_s: float) -> None:
-        super().wait(duration_s)
+        self.waited_in.add(self.mode)
         if self.trouble:
             raise self.trouble
 
@@ -49,18 +50,6 @@ class Impatient(ScriptedOperator):
         raise KeyboardInterrupt
 
 
-class Holding(ScriptedOperator):
-    """An operator who checks at each question that the motor still holds."""
-
-    def __init__(self, robot: HoldingRobot) -> None:
-        super().__init__()
-        self.robot = robot
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert self.robot.mode == "hold"
-        return super().ask(question, answers, meanwhile)
-
-
 def session_of(operator: ScriptedOperator, folder: Path) -> Session:
     return Session(folder, operator, lambda done, total: None)
 
@@ -71,11 +60,10 @@ def leave(robot: HoldingRobot, operator: ScriptedOperator, folder: Path) -> None
 
 
 def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_path: Path) -> None:
-    robot = HoldingRobot()
-    operator = Holding(robot)
+    robot, operator = HoldingRobot(), ScriptedOperator()
     leave(robot, operator, tmp_path)
     assert len(operator.asked) == 1 and operator.asked[0].endswith(HOLD_IT)
-    assert robot.mode == "idle" and robot.closed
+    assert robot.waited_in == {"hold"} and robot.mode == "idle" and robot.closed
 
 
 def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None:

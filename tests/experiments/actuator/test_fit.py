@@ -65,23 +65,25 @@ def test_the_errors_contain_scatter_lever_weights_and_friction_at_rest() -> None
     An unknown part of the friction that is missing under a weight shifts each bench's currents, in either direction.
     """
     random, plan = Random(4), replace(PLAN, lever_tolerance_m=0.002, weight_tolerance=0.005)
-    constants, offsets, tares, dry, viscous = (list[tuple[float, float]]() for _ in range(5))
+    known = (
+        ("torque_constant_nm_a", "torque_constant_error_nm_a", TRUE_NM_A),
+        ("offset_nm", "offset_error_nm", 0.0),
+        ("tare_nm", "tare_error_nm", TARE_A * TRUE_NM_A),
+        ("friction_nm", "friction_error_nm", DRY_A * TRUE_NM_A),
+        ("viscous_nm_s", "viscous_error_nm_s", VISCOUS_A_S * TRUE_NM_A),
+    )
+    reported: dict[str, list[tuple[float, float]]] = {name: [] for name, _, _ in known}
     for seed in range(250):
         lever = 1.0 + random.uniform(-1.0, 1.0) * plan.lever_tolerance_m / plan.lever_m
         truth = lever * (1.0 + random.uniform(-1.0, 1.0) * plan.weight_tolerance)
         entries = make_entries(plan, seed=seed, truth=truth, hidden=random.uniform(-1.0, 1.0))
         fit = fit_joint("right_sweep", plan, entries, 0.083)
         assert fit is not None
-        found = fit.numbers
-        constants.append((found["torque_constant_nm_a"] - TRUE_NM_A, found["torque_constant_error_nm_a"]))
-        offsets.append((found["offset_nm"], found["offset_error_nm"]))
-        tares.append((found["tare_nm"] - TARE_A * TRUE_NM_A, found["tare_error_nm"]))
-        dry.append((found["friction_nm"] - DRY_A * TRUE_NM_A, found["friction_error_nm"]))
-        viscous.append((found["viscous_nm_s"] - VISCOUS_A_S * TRUE_NM_A, found["viscous_error_nm_s"]))
-    assert 0.93 < within_two(constants) <= 1.0
-    assert 0.93 < within_two(offsets) <= 1.0
-    assert 0.93 < within_two(tares) < 0.98
-    assert 0.93 < within_two(dry) < 0.98 and 0.93 < within_two(viscous) < 0.98
+        for name, error, true in known:
+            reported[name].append((fit.numbers[name] - true, fit.numbers[error]))
+    constant, offset, *others = map(within_two, reported.values())
+    assert constant > 0.93 and offset > 0.93
+    assert all(0.93 < fraction < 0.98 for fraction in others)
 
 
 def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> None:

@@ -31,30 +31,23 @@ def test_the_weight_that_was_asked_for_matches(trial: int, weight_g: float, sign
 
 
 @pytest.mark.parametrize(
-    ("trial", "asked_g", "hung_g"), [(1, 20.0, 50.0), (1, 400.0, 600.0), (2, 100.0, 50.0), (2, 800.0, 600.0)]
+    ("trial", "asked_g", "held_g", "other_g", "named"),
+    [
+        (1, 20.0, 50.0, 50.0, "50 g rather than 20 g"),
+        (1, 400.0, 600.0, 600.0, "600 g rather than 400 g"),
+        (2, 100.0, 50.0, 50.0, "50 g rather than 100 g"),
+        (2, 800.0, 600.0, 600.0, "600 g rather than 800 g"),
+        (2, 400.0, 490.0, None, "not 400 g: check that it hangs at 12 cm"),
+        (2, 400.0, 40.0, None, "not 400 g: did it slip off?"),
+        (1, 0.0, 100.0, None, "should be empty"),
+    ],
 )
-def test_another_weight_of_the_list_is_named(trial: int, asked_g: float, hung_g: float) -> None:
+def test_another_weight_of_the_list_or_another_lever_or_none_or_an_arm_that_is_not_empty_is_named(
+    trial: int, asked_g: float, held_g: float, other_g: float | None, named: str
+) -> None:
     step = WeighingStep(trial, asked_g)
-    mismatch = find_mismatch(PLAN, before(step), step, current_a(hung_g), CONFIGURED_NM_A)
-    assert mismatch is not None and mismatch[1] == hung_g
-
-
-def test_a_weight_at_another_lever_matches_nothing() -> None:
-    step = WeighingStep(2, 400.0)
-    mismatch = find_mismatch(PLAN, before(step), step, current_a(490.0), CONFIGURED_NM_A)
-    assert mismatch is not None and mismatch[1] is None and "g, not 400 g: check that it hangs at 12 cm" in mismatch[0]
-
-
-def test_an_arm_that_is_not_empty_is_reported() -> None:
-    step = WeighingStep(1, 0.0)
-    mismatch = find_mismatch(PLAN, before(step), step, current_a(100.0), CONFIGURED_NM_A)
-    assert mismatch is not None and "should be empty" in mismatch[0]
-
-
-def test_a_weight_that_slipped_off_is_reported() -> None:
-    step = WeighingStep(2, 400.0)
-    mismatch = find_mismatch(PLAN, before(step), step, current_a(40.0), CONFIGURED_NM_A)
-    assert mismatch is not None and mismatch[1] is None and "not 400 g: did it slip off?" in mismatch[0]
+    mismatch = find_mismatch(PLAN, before(step), step, current_a(held_g), CONFIGURED_NM_A)
+    assert mismatch is not None and mismatch[1] == other_g and named in mismatch[0]
 
 
 @pytest.mark.parametrize("trusts", [True, False])
