@@ -18,8 +18,8 @@ def make_value(value: float, std_error: float = 0.1, depth_m: float = 0.03) -> E
     return Estimate(value, 2.0 * std_error, 20, True, repeatability=std_error, depth_m=depth_m, speed_m_s=0.1)
 
 
-def make_bound(value: float, std_error: float = 0.1) -> Estimate:
-    return Estimate(value, std_error, 20, True, "the mud did not yield", True, repeatability=std_error)
+def make_bound(value: float) -> Estimate:
+    return Estimate(value, 0.1, 20, True, "the mud did not yield", True, repeatability=0.1)
 
 
 def make_stride(
@@ -60,14 +60,14 @@ def make_log(
     return EvaluatedLog(name, flippers, len(flippers) == 1, in_mud, pandas.concat(frames))
 
 
-def make_walk(pairs: Sequence[tuple[Estimate, Estimate]], name: str = "walk_30N_trial1.csv.gz") -> EvaluatedLog:
+def make_walk(pairs: Sequence[tuple[Estimate, Estimate]]) -> EvaluatedLog:
     """Return a walk with k_s by the left and the right flipper in each stride."""
     strides = [
         make_stride(flipper, index, k_s=k_s)
         for index, pair in enumerate(pairs)
         for flipper, k_s in zip(("left", "right"), pair, strict=True)
     ]
-    return make_log(strides, name, flippers=("left", "right"))
+    return make_log(strides, "walk_30N_trial1.csv.gz", flippers=("left", "right"))
 
 
 def joined(*logs: EvaluatedLog) -> DataFrame:

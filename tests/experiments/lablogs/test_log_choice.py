@@ -64,24 +64,22 @@ def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_o
     assert sorted([path.name for path in paths] for paths in found) == runs
 
 
-def test_a_copy_in_the_folder_of_a_report_is_no_repetition_and_another_log_of_the_name_is_one(tmp_path: Path) -> None:
-    for folder, text in (("report", "1"), ("other", "2"), ("", "1")):
-        (tmp_path / folder).mkdir(exist_ok=True)
-        (tmp_path / folder / "one.csv").write_text(text, encoding="utf-8")
-    assert find_logs([tmp_path]) == [(tmp_path / "one.csv",), (tmp_path / "other" / "one.csv",)]
-
-
-def test_a_csv_next_to_its_compressed_file_is_no_repetition(tmp_path: Path) -> None:
-    (tmp_path / "one.csv").write_text("1", encoding="utf-8")
-    for name, text in (("one", b"1"), ("two", b"1")):
-        (tmp_path / f"{name}.csv.gz").write_bytes(gzip.compress(text))
-    (tmp_path / "two.csv").write_text("2", encoding="utf-8")
-    found = [path.name for (path,) in find_logs([tmp_path])]
-    assert found == ["one.csv", "two.csv", "two.csv.gz"]
-
-
-def test_a_log_that_is_still_being_copied_is_no_repetition(tmp_path: Path) -> None:
-    (tmp_path / "done" / ".partial").mkdir(parents=True)
-    for name in ("done/one.mcap", "done/.two.mcap", "done/.partial/three.mcap"):
-        (tmp_path / name).write_text(name, encoding="utf-8")
-    assert find_logs([tmp_path]) == [(tmp_path / "done" / "one.mcap",)]
+@pytest.mark.parametrize(
+    ("contents", "found"),
+    [
+        # a copy in the folder of a report is no repetition, and another log of the name is one
+        ({"report/one.csv": b"1", "other/one.csv": b"2", "one.csv": b"1"}, ["one.csv", "other/one.csv"]),
+        # a CSV next to its compressed file is no repetition
+        (
+            {"one.csv": b"1", "one.csv.gz": gzip.compress(b"1"), "two.csv": b"2", "two.csv.gz": gzip.compress(b"1")},
+            ["one.csv", "two.csv", "two.csv.gz"],
+        ),
+        # a log that is still being copied is none yet
+        ({"done/one.mcap": b"1", "done/.two.mcap": b"2", "done/.partial/three.mcap": b"3"}, ["done/one.mcap"]),
+    ],
+)
+def test_copies_are_no_repetitions(contents: dict[str, bytes], found: list[str], tmp_path: Path) -> None:
+    for name, content in contents.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    assert find_logs([tmp_path]) == [(tmp_path / name,) for name in found]

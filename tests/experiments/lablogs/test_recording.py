@@ -27,19 +27,19 @@ def make_lab(stance_nm: float = 0.4, swing_nm: float = 0.06, rows: int = 1000, s
     current_a[:, 3] = np.arange(rows)
     angle_rad = np.full((rows, 4), np.nan)
     angle_rad[:, 2:] = 0.001 * np.arange(rows)[:, None]
-    stamp_s = ROW_S * np.arange(rows, dtype=np.float64)
+    unknown = np.full(rows, np.nan)
     return LabLog(
-        stamp_s=stamp_s,
+        stamp_s=ROW_S * np.arange(rows, dtype=np.float64),
         phase=phase,
         angle_rad=angle_rad,
         current_a=current_a,
-        body_x_m=np.full(rows, np.nan),
+        body_x_m=unknown,
         gait={},
         flippers=("right",),
         current_limit_a=np.inf,
         commanded_depth_m=np.full(rows, 0.03),
-        body_height_m=np.full(rows, np.nan),
-        body_pitch_rad=np.full(rows, np.nan),
+        body_height_m=unknown,
+        body_pitch_rad=unknown,
     )
 
 

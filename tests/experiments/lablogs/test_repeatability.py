@@ -26,13 +26,12 @@ def declining_trials(lengths: tuple[int, ...] = (5, 5, 5)) -> list[list[Estimate
     return [[make_value(level * d) for d in DECLINE[:n]] for level, n in zip(LEVELS, lengths, strict=True)]
 
 
-def scattered_trials(claimed: float, trials: int = 60, strokes: int = 6) -> list[list[Estimate]]:
-    """Return trials of one mud, each with another level of later strokes, with 5 % scatter and a claimed error."""
+def scattered_trials(claimed: float) -> list[list[Estimate]]:
+    """Return 60 trials of one mud, each with another level of 6 later strokes, with 5 % scatter and a claimed error."""
     random = np.random.default_rng(5)
-    decline = 0.9 ** np.arange(strokes)
-    first = 1.0 + 0.05 * random.standard_normal(trials)
-    levels = np.exp(0.2 * random.standard_normal(trials))
-    later = levels[:, None] * decline * np.exp(0.05 * random.standard_normal((trials, strokes)))
+    first = 1.0 + 0.05 * random.standard_normal(60)
+    levels = np.exp(0.2 * random.standard_normal(60))
+    later = levels[:, None] * 0.9 ** np.arange(6) * np.exp(0.05 * random.standard_normal((60, 6)))
     return [
         [make_value(one, claimed), *(make_value(k, claimed * k) for k in row)]
         for one, row in zip(first.tolist(), later.tolist(), strict=True)

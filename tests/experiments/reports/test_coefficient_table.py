@@ -69,23 +69,18 @@ def test_bounds_do_not_mix_with_values() -> None:
     assert gathered_text(bounds) == "≥ 2.0"
 
 
-def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
-    """Return estimates of 1e6 with a scatter of 5 %; one that would exceed `limit` is a bound at `limit`."""
-    errors = 0.05 * np.random.default_rng(1).standard_normal(200)
-    return [
-        make_estimate(1e6 * (1.0 + error)) if 1e6 * (1.0 + error) < limit else make_estimate(limit, at_least=True)
-        for error in errors.tolist()
-    ]
-
-
 def test_a_few_strides_in_which_solid_mud_yielded_do_not_count() -> None:
-    """Their mean alone would be 7 % too low, and their scatter would not show it."""
-    strides = strides_in_mud_that_gives_way_at(0.95e6)
+    """Estimates of 1e6 scatter by 5 %, and one that would exceed `limit` is a bound.
+
+    The mean of the others alone would be 7 % too low, and their scatter would not show it.
+    """
+    limit, values = 0.95e6, 1e6 * (1.0 + 0.05 * np.random.default_rng(1).standard_normal(200))
+    strides = [make_estimate(min(value, limit), at_least=value >= limit) for value in values.tolist()]
     alone = gather_coefficient(each for each in strides if not each["at_least"])
     assert alone.value is not None and alone.trials_error is not None
     assert alone.value + 2.0 * alone.trials_error < 1e6
     reported = gather_coefficient(strides)
-    assert (reported.value, reported.at_least, reported.std_error) == (0.95e6, True, None)
+    assert (reported.value, reported.at_least, reported.std_error) == (limit, True, None)
 
 
 def test_a_trial_without_a_standard_error_is_not_taken_as_exact() -> None:

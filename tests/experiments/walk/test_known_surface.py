@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pandas import DataFrame
 
-from control.records import Phase, Rig
+from control.records import FLIPPERS, Phase, Rig
 from experiments.walk.known_surface import k_s_of
 from tests.experiments.synthetic_strides import CONFIGURATION, GEOMETRY, make_profile, make_stride
 
@@ -15,7 +15,7 @@ K, DEPTH_M, SURFACE_M = 0.3e6, 0.03, 0.005
 MOMENT_M3 = GEOMETRY.plate_width_m * (DEPTH_M - SURFACE_M) ** 2 / 2.0
 
 
-def stance(advance_m: float = 0.0) -> DataFrame:
+def stance(advance_m: float) -> DataFrame:
     """Return a stance with f_x = k_s b z²/2 while the body advances by `advance_m`."""
     torques_nm = K * MOMENT_M3 * GEOMETRY.flipper_length_m / np.cos(np.radians(SWEEPS_DEG))
     positions_m = np.linspace(0.0, advance_m, len(SWEEPS_DEG))
@@ -24,21 +24,23 @@ def stance(advance_m: float = 0.0) -> DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("advance_m", "drag_n", "added_n"),
-    [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 2.5, 1.25), (0.001, 2.5, 0.0), (float("nan"), 2.5, 0.0)],
+    ("advance_m", "drag_n", "flippers", "added_n"),
+    [
+        (0.0, 0.0, FLIPPERS, 0.0),
+        (0.1, 0.0, FLIPPERS, 0.0),
+        (0.1, 2.5, FLIPPERS, 1.25),
+        (0.1, 2.5, ("right",), 2.5),
+        (0.001, 2.5, FLIPPERS, 0.0),
+        (float("nan"), 2.5, FLIPPERS, 0.0),
+    ],
 )
-def test_the_law_below_the_known_surface_has_half_of_the_drag_while_the_body_advances(
-    advance_m: float, drag_n: float, added_n: float
+def test_the_law_below_the_known_surface_has_a_flippers_part_of_the_drag_while_the_body_advances(
+    advance_m: float, drag_n: float, flippers: tuple[str, ...], added_n: float
 ) -> None:
-    estimate = k_s_of(stance(advance_m), make_stride(surface_m=SURFACE_M), CONFIGURATION, drag_n)
+    robot = replace(CONFIGURATION, rig=Rig(flippers))
+    estimate = k_s_of(stance(advance_m), make_stride(surface_m=SURFACE_M), robot, drag_n)
     assert estimate["valid"]
     assert estimate["value"] == pytest.approx(K + added_n / MOMENT_M3)
-
-
-def test_a_single_flipper_bears_the_whole_drag() -> None:
-    alone = replace(CONFIGURATION, rig=Rig(("right",)))
-    estimate = k_s_of(stance(0.1), make_stride(surface_m=SURFACE_M), alone, 2.5)
-    assert estimate["value"] == pytest.approx(K + 2.5 / MOMENT_M3)
 
 
 def test_a_stride_without_rows_gives_no_estimate() -> None:
