@@ -25,19 +25,13 @@ from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
 
-@pytest.fixture
-def answering(short_folder: Path) -> Iterator[Path]:
-    """Yield a socket that accepts connections, like that of a running daemon."""
-    path = short_folder / "mudskipper.sock"
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
-        listener.bind(str(path))
-        listener.listen()
-        yield path
-
-
-def test_the_bench_does_not_open_while_a_daemon_runs(configuration: Configuration, answering: Path) -> None:
-    with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
-        HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
+def test_the_bench_does_not_open_while_a_daemon_runs(configuration: Configuration, short_folder: Path) -> None:
+    path = str(short_folder / "mudskipper.sock")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as daemon:
+        daemon.bind(path)
+        daemon.listen()
+        with pytest.raises(BenchError, match="'systemctl stop mudskipper' first"):
+            HardwareRig(replace(configuration, status=StatusParameters(path)))
 
 
 def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, short_folder: Path) -> None:
@@ -47,51 +41,38 @@ def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, shor
 
 
 @pytest.fixture
-def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
-    """Yield the configuration of a simulated robot that runs in real time, in its own process, on local buses."""
+def opened_rig(short_folder: Path, tmp_path: Path) -> Iterator[TestRig]:
+    """Yield a test rig on the local buses of a simulated robot that runs in real time, in its own process."""
     path = write_local_setup(short_folder, tmp_path)
     command = [sys.executable, "-m", "command_line.main", "simulate", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
     try:
-        yield load_configuration(path)
+        configuration, is_heard = load_configuration(path), False
+        while not is_heard:
+            rig = HardwareRig(configuration)
+            is_heard = any(rig.overheard.frames.values())
+            rig.close()
+        with TestRig(HardwareRig(configuration), BenchOperator()) as made:  # the first may have missed some messages
+            yield made
     finally:
         robot.send_signal(signal.SIGTERM)
         robot.wait(LONGEST_S)
-
-
-@pytest.fixture
-def opened_rig(local_robot: Configuration) -> Iterator[TestRig]:
-    rig = HardwareRig(local_robot)
-    while not any(rig.overheard.frames.values()):
-        rig.close()
-        rig = HardwareRig(local_robot)
-    rig.close()  # it may have received only the robot's first messages
-    made = TestRig(rig := HardwareRig(local_robot), BenchOperator())
-    yield made
-    made.force_idle()
-    rig.close()
 
 
 def bad(readings: Iterable[BenchReading]) -> list[str]:
     return [reading.message for reading in readings if not reading.good]
 
 
-def test_every_drive_is_heard_on_real_buses(opened_rig: TestRig) -> None:
-    """A busy computer cannot disturb these checks; those of rates and delays need an idle one."""
-    readings = [
-        reading
-        for check in (check_ids, check_unknown_ids, check_firmware, check_watchdogs)
-        for reading in check(opened_rig)
-    ]
-    assert len(readings) > 3 * len(JOINTS)
-    assert bad(readings) == []
-
-
-def test_on_real_buses_a_joint_is_nudged_or_the_late_computer_is_reported(
+def test_on_real_buses_every_drive_is_heard_and_a_joint_is_nudged_or_the_late_computer_reported(
     opened_rig: TestRig,
 ) -> None:
-    """A late torque proves nothing, so a busy computer ends the nudge with a message."""
-    problems = []
+    """A busy computer cannot disturb the first checks; it ends the nudge with a message, as a late torque proves
+    nothing.
+    """
+    checks = (check_ids, check_unknown_ids, check_firmware, check_watchdogs)
+    readings = [reading for check in checks for reading in check(opened_rig)]
+    assert len(readings) > 3 * len(JOINTS)
+    assert bad(readings) == []
     try:
         readings = list(check_nudge(opened_rig, "left_sweep"))
         problems = bad(readings)
@@ -121,13 +102,19 @@ def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configura
         on_channels(replace(configuration, drive=drive), ["can0"])
 
 
-@pytest.mark.parametrize("given", [["can0", "can1"], ["left=can0", "left=can1"], ["right=can1", "can0"]])
-def test_a_bus_has_one_channel(configuration: Configuration, given: list[str]) -> None:
-    with pytest.raises(BenchError, match=rf"--can {given[1]}: bus (left|right) is given twice"):
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        (["can0", "can1"], "can1: bus left is given twice"),
+        (["left=can0", "left=can1"], "left=can1: bus left is given twice"),
+        (["right=can1", "can0"], "can0: bus right is given twice"),
+        (["middle=can0"], "no bus 'middle'"),
+        (["left="], "a channel is missing"),
+        ([""], "a channel is missing"),
+    ],
+)
+def test_a_channel_that_fits_no_bus_or_a_second_one_of_it_is_refused(
+    configuration: Configuration, given: list[str], why: str
+) -> None:
+    with pytest.raises(BenchError, match=f"--can .*{why}"):
         on_channels(configuration, given)
-
-
-@pytest.mark.parametrize("given", ["middle=can0", "left=", ""])
-def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, given: str) -> None:
-    with pytest.raises(BenchError, match="--can"):
-        on_channels(configuration, [given])

@@ -113,16 +113,6 @@ class DriveRestart:
             rig.robot.restart_drive(2)
 
 
-def of_firmware05(built: bool = True, configured: bool = True, **changes: Any) -> SimulatedRig:
-    """Return a rig with ODrives of firmware 0.5, or one that is only configured or only built so."""
-    text = EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
-    usual, other = parse_configuration(text), parse_configuration(with_drive_type(text, "odrive05"))
-    robot = other if built else usual
-    drives = on_blocks(robot).drives(robot)
-    drives["left_sweep"] = replace(drives["left_sweep"], **changes)
-    return SimulatedRig(other if configured else usual, robot, drives)
-
-
 def stuck_encoder(configuration: Configuration) -> SimulatedRig:
     """Return a rig with an encoder that always reports the same angle, and no speed."""
     rig = SimulatedRig(configuration)
@@ -162,8 +152,18 @@ def section(name: str, **changes: float) -> Rigs:
     return lambda c: SimulatedRig(replace(c, **{name: replace(getattr(c, name), **changes)}))
 
 
-def firmware05(**changes: Any) -> Rigs:
-    return lambda configuration: of_firmware05(**changes)
+def firmware05(built: bool = True, configured: bool = True, **changes: Any) -> Rigs:
+    """Make rigs with ODrives of firmware 0.5, or one that is only configured or only built so."""
+
+    def make(_: Configuration) -> SimulatedRig:
+        text = EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
+        usual, other = parse_configuration(text), parse_configuration(with_drive_type(text, "odrive05"))
+        robot = other if built else usual
+        drives = on_blocks(robot).drives(robot)
+        drives["left_sweep"] = replace(drives["left_sweep"], **changes)
+        return SimulatedRig(other if configured else usual, robot, drives)
+
+    return make
 
 
 # what is wrong, the stage that finds it, and a part of its advice; stages before `begin` pass and are slow
