@@ -60,10 +60,6 @@ class WeighedRobot(CalibratedRobot):
         return {JOINT: entries}, []
 
 
-class ScatteredRobot(WeighedRobot):
-    scatter_a = 1.0
-
-
 class InterruptedOperator(ScriptedOperator):
     """Presses Ctrl-C at one prompt."""
 
@@ -81,13 +77,12 @@ class InterruptedOperator(ScriptedOperator):
 class Case:
     folder: Path
     truth: Mapping[tuple[str, ...], Any]
-    robot: type[WeighedRobot] = WeighedRobot
 
     def run(self, operator: ScriptedOperator) -> Result:
         session = Session(self.folder, operator, lambda done, total: None, simulated=True)
         built = BuiltRobot(parse_configuration(changed_text(CONFIGURATION.text, self.truth)), TRUE_NM_A)
         target = find_target(self.folder, CONFIGURATION.text, session)
-        return calibrate_robot(self.robot(session, built), CONFIGURATION, PLAN, "Ada", target)
+        return calibrate_robot(WeighedRobot(session, built), CONFIGURATION, PLAN, "Ada", target)
 
 
 @pytest.fixture
@@ -128,8 +123,11 @@ def test_the_configuration_gets_what_was_found(case: Case) -> None:
     assert {"motion under torque", "current over command"} <= {each["reading"] for each in numbers["torques"]}
 
 
-def test_a_joint_whose_torque_constant_is_uncertain_is_not_calibrated(case: Case) -> None:
-    replace(case, robot=ScatteredRobot).run(ScriptedOperator())
+def test_a_joint_whose_torque_constant_is_uncertain_is_not_calibrated(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(WeighedRobot, "scatter_a", 1.0)
+    case.run(ScriptedOperator())
     drive = changed(case).drive[JOINT]
     assert (drive.sign, drive.torque_constant_nm_a) == (-1, CONFIGURATION.drive[JOINT].torque_constant_nm_a)
     assert not drive.calibrated.date and not drive.serial_number

@@ -1,7 +1,8 @@
 """Hands alone, without torque, show each error of a configuration: the robot is built otherwise than configured."""
 
 import tracemalloc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from math import degrees, radians
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from control.records import JOINTS
 from experiments.actuator.file_change import changed_text
 from experiments.actuator.simulation import BuiltRobot
 from experiments.bench.operator import Hand
+from experiments.bench.test_rig import TestRig
 from experiments.calibration.hand_steps import HandSteps, hand_changes, level_key, stops_deg
 from experiments.calibration.robots import CalibratedRobot, build_with_errors
 from experiments.robot.bench_errors import BenchError
@@ -26,8 +28,8 @@ from simulation.body.plant import END_STOPS_RAD
 from tests.scripted_operator import ScriptedOperator
 
 Changes = Mapping[tuple[str, ...], Any]
+AS_CONFIGURED: Changes = {}
 CONFIGURATION = simulated_configuration()
-STOPS_DEG = {"min": -110.0, "max": 110.0}
 CUBEMARS = simulated_configuration(drive_type="mit:AK80-9")
 
 
@@ -36,18 +38,31 @@ def with_changes(configuration: Configuration, changes: Changes) -> Configuratio
     return parse_configuration(changed_text(configuration.text, {**uncalibrated, **changes}))
 
 
-def move_by_hand(
-    folder: Path, configuration: Configuration, truth: Changes, *joints: str, operator: ScriptedOperator | None = None
-) -> dict[str, Entry]:
-    """Return the notebook's entries of a robot whose truth differs from its configuration."""
-    operator = operator or ScriptedOperator()
+@contextmanager
+def opened(
+    folder: Path,
+    operator: ScriptedOperator,
+    configuration: Configuration = CONFIGURATION,
+    truth: Changes = AS_CONFIGURED,
+) -> Iterator[TestRig]:
+    """Yield the rig of a robot whose truth differs from its configuration."""
     session = Session(folder, operator, lambda done, total: None, simulated=True)
     robot = CalibratedRobot(session, BuiltRobot(with_changes(configuration, truth)))
-    notebook = Notebook(folder, {})
     with robot.open(configuration) as test_rig:
-        steps = HandSteps(test_rig, operator).steps(joints or JOINTS)
-        conduct_steps(steps, notebook, operator, session.show, {})
+        yield test_rig
+
+
+def conduct(test_rig: TestRig, folder: Path, operator: ScriptedOperator, *joints: str) -> dict[str, Entry]:
+    """Return the notebook's entries."""
+    notebook, steps = Notebook(folder, {}), HandSteps(test_rig, operator).steps(joints or JOINTS)
+    conduct_steps(steps, notebook, operator, lambda done, total: None, {})
     return notebook.entries
+
+
+def move_by_hand(folder: Path, configuration: Configuration, truth: Changes, *joints: str) -> dict[str, Entry]:
+    operator = ScriptedOperator()
+    with opened(folder, operator, configuration, truth) as test_rig:
+        return conduct(test_rig, folder, operator, *joints)
 
 
 @pytest.mark.parametrize(
@@ -79,14 +94,14 @@ def test_a_limit_beyond_a_stop_is_narrowed_to_one_degree_before_it(tmp_path: Pat
     assert found == {("limits", "sweep_max_deg"): 98.0}
 
 
+def ends(front_deg: float, rear_deg: float, velocity_scale: float = 1.04) -> Entry:
+    return {"front_rad": radians(front_deg), "rear_rad": radians(rear_deg), "velocity_scale": velocity_scale}
+
+
 def test_limits_are_narrowed_for_the_joint_with_the_least_range_on_either_side() -> None:
     """A level that a hand cannot tell from zero shifts nothing."""
-
-    def ends(front_deg: float, rear_deg: float) -> Entry:
-        return {"front_rad": radians(front_deg), "rear_rad": radians(rear_deg), "velocity_scale": 1.04}
-
-    limits = {("limits", f"sweep_{end}_deg"): deg for end, deg in STOPS_DEG.items()}
-    wide = with_changes(CONFIGURATION, limits | {("drive", "right_sweep", "zero_turn"): 0.2})
+    zero, low, high = ("drive", "right_sweep", "zero_turn"), ("limits", "sweep_min_deg"), ("limits", "sweep_max_deg")
+    wide = with_changes(CONFIGURATION, {low: -110.0, high: 110.0, zero: 0.2})
     entries = {
         level_key("left"): {"left_sweep": radians(1.9)},
         level_key("right"): {"right_sweep": radians(-10.0)},
@@ -94,11 +109,7 @@ def test_limits_are_narrowed_for_the_joint_with_the_least_range_on_either_side()
         "right_sweep: ends": ends(75.5, -109.0),
     }
     zero_turn = 0.2 - wide.drive["right_sweep"].sign * 10.0 / 360.0
-    assert hand_changes(wide, entries) == {
-        ("drive", "right_sweep", "zero_turn"): pytest.approx(zero_turn, abs=1e-5),
-        ("limits", "sweep_min_deg"): -94.0,
-        ("limits", "sweep_max_deg"): 84.0,
-    }
+    assert hand_changes(wide, entries) == {zero: pytest.approx(zero_turn, abs=1e-5), low: -94.0, high: 84.0}
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
@@ -110,41 +121,35 @@ def test_a_robot_to_practise_on_has_its_zero_a_little_off_the_configured_one(see
     assert 0.03 <= off_turn <= 0.1
 
 
+class WaitingOperator(ScriptedOperator):
+    """Looks at the robot this often before each answer."""
+
+    def __init__(self, looks: int) -> None:
+        super().__init__()
+        self._looks = looks
+
+    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
+        for _ in range(self._looks):
+            meanwhile()
+        return super().ask(question, answers, lambda: None)
+
+
 def test_a_prompt_that_waits_for_hours_takes_no_memory(tmp_path: Path) -> None:
-    session = Session(tmp_path, ScriptedOperator(), lambda done, total: None, simulated=True)
-    with CalibratedRobot(session, BuiltRobot(CONFIGURATION)).open(CONFIGURATION) as test_rig:
-        steps = HandSteps(test_rig, PatientOperator()).steps(["left_sweep"])
+    operator = WaitingOperator(50)
+    with opened(tmp_path, operator) as test_rig:
         tracemalloc.start()
-        steps[0].prepare()
+        HandSteps(test_rig, operator).steps(["left_sweep"])[0].prepare()
         kept_bytes, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
     assert kept_bytes < 1_000_000  # all ticks of these 5 s have 3 MB
 
 
-class PatientOperator(ScriptedOperator):
-    """Answers after five seconds."""
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        for _ in range(50):
-            meanwhile()
-        return super().ask(question, answers, meanwhile)
-
-
-class HastyOperator(ScriptedOperator):
-    """Answers before the robot is looked at once."""
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        return super().ask(question, answers, lambda: None)
-
-
 def test_an_operator_who_turns_nothing_is_asked_again_and_then_refused(tmp_path: Path) -> None:
-    operator = HastyOperator()
-    session = Session(tmp_path, operator, lambda done, total: None, simulated=True)
-    with CalibratedRobot(session, BuiltRobot(CONFIGURATION)).open(CONFIGURATION) as test_rig:
+    operator = WaitingOperator(0)
+    with opened(tmp_path, operator) as test_rig:
         test_rig.operator.hand = Hand()  # does nothing
-        steps = HandSteps(test_rig, operator).steps(["left_sweep"])
         with pytest.raises(BenchError, match="left_sweep turned by 0 degrees|turned instead of left_sweep"):
-            conduct_steps(steps, Notebook(tmp_path, {}), operator, session.show, {})
+            conduct(test_rig, tmp_path, operator, "left_sweep")
     assert len(operator.reported) == 2
 
 
@@ -154,9 +159,8 @@ def test_exchanged_motors_end_the_calibration_with_what_to_do(tmp_path: Path) ->
         move_by_hand(tmp_path, CONFIGURATION, exchanged, "left_sweep")
 
 
-def test_a_velocity_whose_scale_is_no_key_is_refused(tmp_path: Path) -> None:
-    entries = move_by_hand(tmp_path, CONFIGURATION, {}, "left_sweep")
-    entries["left_sweep: ends"]["velocity_scale"] = 1.2
+def test_a_velocity_whose_scale_is_no_key_is_refused() -> None:
+    entries = {level_key("left"): {"left_sweep": 0.0}, "left_sweep: ends": ends(90.0, -90.0, velocity_scale=1.2)}
     with pytest.raises(BenchError, match="left_sweep: .* 1.20 times"):
         hand_changes(CONFIGURATION, entries)
 
@@ -164,5 +168,6 @@ def test_a_velocity_whose_scale_is_no_key_is_refused(tmp_path: Path) -> None:
 def test_a_joint_is_moved_again_and_the_step_before_is_redone_on_request(tmp_path: Path) -> None:
     """The level flipper, front; the one before; level, front, rear: again; front, rear."""
     operator = ScriptedOperator(GO_ON, REDO, GO_ON, GO_ON, REDO, GO_ON, GO_ON)
-    entries = move_by_hand(tmp_path, CONFIGURATION, {}, "left_sweep", operator=operator)
+    with opened(tmp_path, operator) as test_rig:
+        entries = conduct(test_rig, tmp_path, operator, "left_sweep")
     assert len(operator.asked) == 7 and entries.keys() == {level_key("left"), "left_sweep: ends"}

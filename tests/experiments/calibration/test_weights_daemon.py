@@ -11,18 +11,7 @@ from experiments.calibration.robots import running_daemon
 from firmware_host.configuration.loading import parse_configuration
 from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
-from tests.running_bench import Bench
 from tests.waiting import wait_until
-
-
-def test_the_daemon_of_the_weights_ends_with_them(own_bench: Bench, tmp_path: Path) -> None:
-    own_bench.stop_daemon()
-    configuration = parse_configuration(own_bench.configuration.read_text(encoding="utf-8"))
-    with running_daemon(configuration, tmp_path) as socket, StatusClient(socket) as client:
-        assert client.call("status")["robot"] == "simulated"
-    assert not socket.exists()
-    own_bench.restart_daemon()
-    own_bench.wait_until_ready()
 
 
 def test_the_daemon_of_the_weights_ends_where_the_program_is_killed(short_folder: Path, tmp_path: Path) -> None:
@@ -44,7 +33,7 @@ with running_daemon(load_configuration(Path({str(path)!r})), Path({str(short_fol
     wait_until(lambda: not socket.exists())
 
 
-def test_two_robots_of_one_user_have_a_daemon_each_and_each_continues(
+def test_two_robots_of_one_user_have_a_daemon_each_which_ends_with_its_weights_and_each_continues(
     short_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The readings of a joint belong to the configuration of its daemon, with all paths."""
@@ -57,5 +46,6 @@ def test_two_robots_of_one_user_have_a_daemon_each_and_each_continues(
         monkeypatch.setattr(os, "getpid", lambda: 0)  # as of another program
         with running_daemon(robots[1], short_folder / "second") as socket, StatusClient(socket) as client:
             assert client.call("status")["robot"] == "second"
+        assert first.exists() and not socket.exists()
     with running_daemon(robots[0], short_folder / "first") as again:
         assert again == first
