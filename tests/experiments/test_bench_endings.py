@@ -58,12 +58,6 @@ def robot(tmp_path: Path) -> Iterator[InterruptedRobot]:
     made.close()
 
 
-def experiment(robot: InterruptedRobot) -> None:
-    arm(robot, OPERATOR)
-    move(robot, {"left_adduction": 0.1})
-    walk(robot, 0.03, 1)
-
-
 def last_angles_rad(folder: Path) -> np.ndarray:
     """Return the angles of both adduction joints when the torque went off."""
     ticks = read_log(folder / "log.mcap").ticks
@@ -79,7 +73,9 @@ def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
 ) -> None:
     robot.waits_left = waits
     with pytest.raises(KeyboardInterrupt):
-        experiment(robot)
+        arm(robot, OPERATOR)
+        move(robot, {"left_adduction": 0.1})
+        walk(robot, 0.03, 1)
     leave(robot, OPERATOR, tmp_path)
     modes = read_log(tmp_path / "log.mcap").ticks["mode"]
     assert modes[-1] not in ENERGISED
@@ -87,8 +83,10 @@ def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
         assert np.abs(last_angles_rad(tmp_path)).max() < UP_RAD
 
 
-def hold_in_stance(robot: InterruptedRobot) -> None:
-    """Interrupt one current for a moment, so that the robot stops its walk and holds its pose in the mud."""
+def test_flippers_in_the_mud_are_raised_before_the_torque_goes_off_after_a_fault(
+    robot: InterruptedRobot, tmp_path: Path
+) -> None:
+    """One current is interrupted for a moment, so that the robot stops its walk and holds its pose in the mud."""
     arm(robot, OPERATOR)
     robot.call("walk", depth_m=0.03)
     loop = robot.lockstep.loop
@@ -98,12 +96,6 @@ def hold_in_stance(robot: InterruptedRobot) -> None:
     robot.wait(0.3)
     status = robot.call("status")
     assert status["mode"] == "hold" and status["drives"][1]["angle_rad"] < -UP_RAD
-
-
-def test_flippers_in_the_mud_are_raised_before_the_torque_goes_off_after_a_fault(
-    robot: InterruptedRobot, tmp_path: Path
-) -> None:
-    hold_in_stance(robot)
     rest(robot)
     robot.close()
     assert np.abs(last_angles_rad(tmp_path)).max() < UP_RAD

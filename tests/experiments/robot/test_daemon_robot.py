@@ -52,15 +52,6 @@ def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_p
         robot.close()
 
 
-def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:
-    """It also stops if the experiment dies right after `arm`, because it takes its lease before the torque."""
-    robot = DaemonRobot(bench.socket)
-    arm(robot)
-    robot._client.close()
-    report = bench.wait_for(lambda status: bool(status["mode"] not in ("arming", "hold", "stopping")))
-    assert "lease" in report["notice"]
-
-
 def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_raised_and_without_torque(
     bench: Bench,
 ) -> None:

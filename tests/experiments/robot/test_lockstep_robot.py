@@ -104,29 +104,19 @@ def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRob
         move(robot, {"right_adduction": 0.1})
 
 
-@pytest.fixture
-def faulty(robot: LockstepRobot) -> LockstepRobot:
-    """Return a robot in FAULT: a drive was restarted under torque some seconds ago."""
+def test_a_fault_is_cleared_only_where_the_operator_agrees(robot: LockstepRobot) -> None:
     arm(robot)
-    restart_right_sweep(robot)
+    restart_right_sweep(robot)  # under torque
     robot.wait(3.0)
-    assert robot.call("status")["mode"] == "fault"
-    return robot
-
-
-def test_a_fault_is_cleared_where_the_operator_agrees(faulty: LockstepRobot) -> None:
-    operator = ScriptedOperator(CLEAR)
-    arm(faulty, operator)
-    assert list(operator.offered[0]) == [CLEAR, LEAVE]  # an automatic operator takes the first
-    assert faulty.call("status")["mode"] == "hold"
-    (question,) = operator.asked
-    assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question and "(for 4 s)\n" in question
-
-
-def test_a_fault_that_the_operator_leaves_ends_the_experiment(faulty: LockstepRobot) -> None:
     with pytest.raises(EndedError, match="the fault remains; remove its cause, then 'mudskipper clear'"):
-        arm(faulty, ScriptedOperator(LEAVE))
-    assert faulty.call("status")["mode"] == "fault"
+        arm(robot, ScriptedOperator(LEAVE))
+    assert robot.call("status")["mode"] == "fault"
+    operator = ScriptedOperator(CLEAR)
+    arm(robot, operator)
+    assert robot.call("status")["mode"] == "hold"
+    assert list(operator.offered[0]) == [CLEAR, LEAVE]  # an automatic operator takes the first
+    (question,) = operator.asked
+    assert question.startswith("The robot is in FAULT:\n") and "right_sweep" in question
 
 
 def test_a_transient_fault_makes_no_prompt(robot: LockstepRobot) -> None:
