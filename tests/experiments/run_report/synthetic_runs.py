@@ -42,15 +42,13 @@ def stride(
     return own | motion | {"two_surfaces": False}, estimates
 
 
-def run_of(
-    strides: Sequence[StrideRows], name: str = "run", robot: str = "R1", flippers: tuple[str, ...] = FLIPPERS
-) -> Run:
+def run_of(strides: Sequence[StrideRows], name: str = "run") -> Run:
     return Run(
         name=name,
         paths=[Path(f"{name}.mcap")],
-        robot=robot,
+        robot="R1",
         log=None,
-        replay=Replay([], flippers),
+        replay=Replay([], FLIPPERS),
         layout=None,
         muds_from=MudsFrom.NAMES,
         walks=[],

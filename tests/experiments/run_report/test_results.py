@@ -27,7 +27,6 @@ from experiments.run_report.results import (
     headline_of,
     is_shown,
     reaction_of,
-    run_labels,
     speed_of,
     travel_of,
 )
@@ -111,12 +110,9 @@ def test_bounds_and_invalid_estimates_are_no_values() -> None:
 
 
 def test_the_hardest_reaction_to_a_cause_counts() -> None:
-    def cause(name: str, *consequences: str) -> LoggedCause:
-        return LoggedCause(0.0, 1, name, (), "", "", consequences)
-
-    assert reaction_of(cause("drive_version")) is Reaction.NONE
-    assert reaction_of(cause("loop_overrun")) is Reaction.WARN
-    assert reaction_of(cause("bus_off", "drive_silent")) > Reaction.WARN
+    causes = (("drive_version", ()), ("loop_overrun", ()), ("bus_off", ("drive_silent",)))
+    none, warn, hard = (reaction_of(LoggedCause(0.0, 1, name, (), "", "", then)) for name, then in causes)
+    assert none is Reaction.NONE and warn is Reaction.WARN and hard > warn
 
 
 def test_a_log_s_estimates_stand_even_if_this_version_would_estimate_otherwise(
@@ -225,30 +221,22 @@ def test_a_run_that_is_faster_than_one_backward_differs_by_a_positive_percentage
 
 
 def test_a_comparison_names_runs_by_their_trials_and_by_their_logs_where_these_repeat() -> None:
-    trials = [
-        {"mud": "A", "trial": "3", "tags": "wet,warm", "operator": "Anna"},
-        {"mud": "A", "trial": "4"},
-        {"mud": "A", "trial": "4"},
-        {},
-    ]
+    named, repeated = {"mud": "A", "trial": "3", "tags": "wet,warm", "operator": "Anna"}, {"mud": "A", "trial": "4"}
     runs = [run_of([stride("A")], name=f"log-{number}") for number in range(4)]
+    trials = [named, repeated, repeated, {}]
     headlines = [headline_of(run) | {"trial": trial} for run, trial in zip(runs, trials, strict=True)]
     labels = ["mud A, trial 3, wet, warm", "mud A, trial 4, log-1", "mud A, trial 4, log-2", "log-3"]
-    assert [*run_labels(runs, headlines).values()] == labels
-    rows = comparison_result(runs, headlines).tables[0].rows
-    assert list(rows["run"]) == labels
+    assert list(comparison_result(runs, headlines).tables[0].rows["run"]) == labels
 
 
 def test_trials_of_one_daemon_are_runs_of_their_own_and_their_segments_are_not() -> None:
     """As the daemon numbers the logs of one run: nothing, trial 3 in two segments, trial 4."""
-    trials = [OperatorReport(BEGUN, datetime.now(UTC), "Anna", text).event for text in ('{"trial": "3"}', "{}")]
-    begins = ["", trials[0], "", trials[1]]
+    begun = [OperatorReport(BEGUN, datetime.now(UTC), "Anna", text).event for text in ('{"trial": "3"}', "{}")]
     logs: dict[Path, Any] = {
         Path(f"{n}.mcap"): SimpleNamespace(metadata={"segment": str(n)}, events=[{"text": text}])
-        for n, text in enumerate(begins)
+        for n, text in reversed([*enumerate(["", begun[0], "", begun[1]])])
     }
-    in_any_order = {path: logs[path] for path in reversed(logs)}
-    assert [[path.stem for path in part] for part in _trials_in(in_any_order)] == [["0"], ["1", "2"], ["3"]]
+    assert [[path.stem for path in part] for part in _trials_in(logs)] == [["0"], ["1", "2"], ["3"]]
 
 
 def test_a_ground_that_does_not_keep_the_law_of_mud_is_a_finding() -> None:

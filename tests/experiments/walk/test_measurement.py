@@ -19,7 +19,7 @@ from experiments.studies.walk import walking_bench
 from experiments.study.notebook import NAME, Entry, Notebook
 from experiments.trackway.bench import Muds, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError, MeasuredTrials
+from experiments.trials.mud_trials import InvalidTrialError, MeasuredTrials
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, WalkTrials, measure, monitor_advance, require_mud
 from experiments.walk.report import Report, compared_strides, result_of, walks_of
@@ -44,10 +44,6 @@ def measured() -> dict[str, Entry]:
         assert {"report.html", "summary.json", "figure6_trial1.png"} <= {path.name for path in folder.iterdir()}
         first, *_ = (folder / NAME).read_text(encoding="utf-8").splitlines()
         return Notebook(folder, json.loads(first)["plan"]).entries
-
-
-def bench_of(folder: Path, plan: WalkTrials) -> Bench:
-    return walking_bench(ScriptedOperator(), plan, Notebook(folder, plan.identity))
 
 
 def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
@@ -169,7 +165,7 @@ class ChangedRobot(LockstepRobot):
 
 def walk_once(folder: Path, muds: Muds = MUDS, **changes: Any) -> Entry:
     """Walk over long muds, so that only the change of the robot ends the walk."""
-    bench = bench_of(folder, TINY)
+    bench = walking_bench(ScriptedOperator(), TINY, Notebook(folder, TINY.identity))
     bench.robot.__class__ = ChangedRobot
     vars(bench.robot).update(changes)
     bench.prepare(TINY.planned[0])
