@@ -30,12 +30,7 @@ def walked(rail_damping_n_s_m: float, strength_pa: float, depth_m: float, seed: 
 
 
 @pytest.fixture(scope="module")
-def trials() -> SyntheticTrials:
-    return SyntheticTrials(walked)
-
-
-@pytest.fixture(scope="module")
-def summary(trials: SyntheticTrials) -> dict[str, Any]:
+def summary() -> dict[str, Any]:
     """Fit once to a table with the synthetic truth."""
     table = {
         rule: {mud: Speed(true_speed_cm_s(TRUE_DAMPING, TRUTH[mud], depth_m), 0.3) for mud in MUDS}
@@ -43,7 +38,7 @@ def summary(trials: SyntheticTrials) -> dict[str, Any]:
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mud_fit, "PAPER_TABLE", table)
-        return study(trials, seeds=1).json()
+        return study(SyntheticTrials(walked), seeds=1).json()
 
 
 def test_the_fit_recovers_a_synthetic_truth(summary: dict[str, Any]) -> None:

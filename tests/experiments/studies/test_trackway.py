@@ -17,12 +17,12 @@ from experiments.trackway.walk import Walk, WalkedStride
 from simulation.mud.clay import MUDS
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
-NAMES = list(MUDS)
-WHOLE = Walk([WalkedStride(mud, 1.8, 0.03, 0.12, 2.0, 0.0) for mud in NAMES for _ in range(3)], "")
-
 
 def stride(mud: str, position_m: float = 0.0, step_m: float = 0.12, duration_s: float = 2.0) -> WalkedStride:
     return WalkedStride(mud, position_m, 0.03, step_m, duration_s, 0.0)
+
+
+WHOLE = Walk([stride(mud) for mud in MUDS for _ in range(3)], "")
 
 
 def walked(walk: Walk = WHOLE, **row: Any) -> dict[str, Any]:
@@ -77,10 +77,10 @@ def test_the_first_stride_of_a_constant_depth_does_not_count() -> None:
 
 def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
     report = reported().summary
-    assert report["best_constant_depth"] == dict.fromkeys(NAMES, {"depth_cm": 2.75, "mean": 8.0})
+    assert report["best_constant_depth"] == dict.fromkeys(MUDS, {"depth_cm": 2.75, "mean": 8.0})
     assert report["best_constant_mean_over_muds"] == 8.0
     assert list(report["table"]) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
-    assert report["over_best"]["adaptive, paper"] == dict.fromkeys(NAMES, 0.75)
+    assert report["over_best"]["adaptive, paper"] == dict.fromkeys(MUDS, 0.75)
     assert report["constant_depth_cm_s"]["48.5"]["2"] == 7.0
 
 

@@ -15,45 +15,32 @@ STUDY = "experiments.studies.sweep"
 PRINT = "import sys; from experiments.study.provenance import source_digest; print(source_digest(sys.argv[1]))"
 
 
-@pytest.fixture
-def copy(tmp_path: Path) -> Path:
-    """Provide the product's folders at another location, as a wheel installs them."""
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path
-
-
 def digest_of(folder: Path, module: str = STUDY) -> str:
     command = [sys.executable, "-c", PRINT, module]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def test_another_location_has_the_same_digest_and_a_changed_constant_another_one(copy: Path) -> None:
-    here = identity(STUDY)["sources"]
-    assert digest_of(copy) == here
-    for unused in ("experiments/actuator/plan.py", "command_line/main.py", "experiments/studies/mud_fit.py"):
-        with (copy / unused).open("a") as module:
-            module.write("ANOTHER = 1\n")
-    (copy / "simulation" / "another.py").write_text("ANOTHER = 1\n")
-    assert digest_of(copy) == here
-    clay = copy / "simulation" / "mud" / "clay.py"
-    changed = clay.read_text(encoding="utf-8").replace("ADHESION = 0.25", "ADHESION = 0.26")
-    clay.write_text(changed, encoding="utf-8")
-    assert digest_of(copy) != here
+def test_only_what_a_study_computes_with_changes_its_digest(tmp_path: Path) -> None:
+    """The product's folders are copied to another location, as a wheel installs them."""
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
 
+    def change(*paths: str) -> None:
+        for path in paths:
+            with (tmp_path / path).open("a", encoding="utf-8") as file:
+                file.write("ANOTHER = 1\n")
 
-def test_a_gait_that_ships_counts(copy: Path) -> None:
-    before = digest_of(copy)
-    with (copy / "firmware_host" / "configuration" / "gaits" / "measuring.toml").open("a") as gait:
-        gait.write("# another\n")
-    assert digest_of(copy) != before
-
-
-def test_an_import_within_a_function_counts(copy: Path) -> None:
-    before = digest_of(copy, "command_line.experiments.studies")
-    with (copy / "experiments/study/cluster_workers.py").open("a") as module:
-        module.write("ANOTHER = 1\n")
-    assert digest_of(copy, "command_line.experiments.studies") != before
+    change("experiments/actuator/plan.py", "command_line/main.py", "experiments/studies/mud_fit.py", "control/new.py")
+    digests = [digest_of(tmp_path)]
+    assert digests == [identity(STUDY)["sources"]]
+    for used in ("simulation/mud/clay.py", "firmware_host/configuration/gaits/measuring.toml"):
+        change(used)
+        digests.append(digest_of(tmp_path))
+    imports_within_a_function = "command_line.experiments.studies"
+    digests.append(digest_of(tmp_path, imports_within_a_function))
+    change("experiments/study/cluster_workers.py")
+    digests.append(digest_of(tmp_path, imports_within_a_function))
+    assert len(set(digests)) == 5
 
 
 def test_two_modules_have_the_digest_of_all_that_they_import() -> None:

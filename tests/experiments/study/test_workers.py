@@ -50,17 +50,14 @@ def test_an_exception_of_a_trial_reaches_the_caller() -> None:
 
 def test_a_long_trial_is_looked_at_meanwhile(tmp_path: Path) -> None:
     """The trial ends only after it was looked at twice."""
-    looks = [tmp_path / "first", tmp_path / "second"]
-    watched = partial(run_locally, processes=1, meanwhile=lambda: next_missing(looks).touch())
-    run_parallel(
-        [partial(wait_for_file, looks[1])],
-        ignore,
-        watched,
-    )
+    mark, looks = tmp_path / "looked at", list[int]()
 
+    def look() -> None:
+        looks.append(1)
+        if len(looks) == 2:
+            mark.touch()
 
-def next_missing(paths: list[Path]) -> Path:
-    return next((path for path in paths if not path.exists()), paths[-1])
+    run_parallel([partial(wait_for_file, mark)], ignore, partial(run_locally, processes=1, meanwhile=look))
 
 
 def wait_for_file(path: Path) -> None:

@@ -12,9 +12,9 @@ import pytest
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, leave
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.study import session as session_module
 from experiments.study.notebook import Entry, Notebook, NotebookError
 from experiments.study.prompt import GO_ON, REDO, SKIP
+from experiments.study.session import Session
 from experiments.trials import mud_trials
 from experiments.trials.mud_trials import (
     KEEP,
@@ -39,8 +39,7 @@ class AskedRobot(StillRobot):
     def __init__(self) -> None:
         super().__init__("idle")
         self.called: list[str] = []
-        self.blocked = False
-        self.deaf = False
+        self.blocked = self.deaf = False
 
     def call(self, method: str, **params: Any) -> Any:
         if self.deaf:
@@ -61,7 +60,7 @@ DOUBTFUL = {"remarks": ["the base moved by 5.0 mm"]}
 FIRST = "47.6 %, trial 1 of 3"
 
 
-class Session:
+class ScriptedTrials:
     """Owns a bench of scripted parts; its measurements give the listed outcomes."""
 
     def __init__(
@@ -91,13 +90,13 @@ class Session:
             raise outcome
         return outcome
 
-    def conduct(self) -> Session:
+    def conduct(self) -> ScriptedTrials:
         conduct_trials(self.bench, TRIALS, self.measure, lambda done, of: self.shown.append((done, of)))
         return self
 
 
 def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
-    session = Session(tmp_path).conduct()
+    session = ScriptedTrials(tmp_path).conduct()
     assert session.prepared == session.measured == list(session.notebook.entries) == ALL
     assert session.shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
     assert session.robot.called.count("disarm") == len(TRIALS)
@@ -105,8 +104,8 @@ def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
 
 def test_an_interrupted_experiment_continues(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        Session(tmp_path, [{"remarks": []}, KeyboardInterrupt()]).conduct()
-    second = Session(tmp_path).conduct()
+        ScriptedTrials(tmp_path, [{"remarks": []}, KeyboardInterrupt()]).conduct()
+    second = ScriptedTrials(tmp_path).conduct()
     assert second.prepared == second.measured == ALL[1:]
 
 
@@ -126,7 +125,7 @@ def test_an_interrupted_experiment_continues(tmp_path: Path) -> None:
 def test_the_operator_decides_on_invalid_and_doubtful_trials(
     outcomes: list[Entry], answers: list[str], asked: str, measured: list[str], kept: list[str], tmp_path: Path
 ) -> None:
-    session = Session(tmp_path, outcomes, answers).conduct()
+    session = ScriptedTrials(tmp_path, outcomes, answers).conduct()
     assert session.operator.asked[-1].startswith(asked)
     assert session.operator.reported == ([f"{FIRST}: the base moved by 5.0 mm"] if outcomes == [DOUBTFUL] else [])
     assert session.prepared == session.measured == measured
@@ -137,28 +136,28 @@ def test_the_operator_decides_on_invalid_and_doubtful_trials(
 
 
 def test_a_third_failure_ends_the_experiment_unless_the_operator_repeats_it(tmp_path: Path) -> None:
-    session = Session(tmp_path, [{"remarks": []}, *[MOVED] * 3])
+    session = ScriptedTrials(tmp_path, [{"remarks": []}, *[MOVED] * 3])
     with pytest.raises(BenchError, match="trial 2 of 3 went wrong 3 times"):
         session.conduct()
     assert list(session.notebook.entries) == ALL[:1]
 
 
 def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, prepared=(GO_ON, SKIP)).conduct()
+    session = ScriptedTrials(tmp_path, prepared=(GO_ON, SKIP)).conduct()
     assert list(counted_entries(session.notebook)) == [ALL[0], ALL[2]]
-    again = Session(tmp_path).conduct()
+    again = ScriptedTrials(tmp_path).conduct()
     assert again.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
 
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, prepared=(GO_ON, REDO)).conduct()
+    session = ScriptedTrials(tmp_path, prepared=(GO_ON, REDO)).conduct()
     assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
     assert session.notebook.entries[ALL[0]]["count"] == 2
 
 
 def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
-        counted_entries(Session(tmp_path, prepared=(SKIP, SKIP, SKIP)).conduct().notebook)
+        counted_entries(ScriptedTrials(tmp_path, prepared=(SKIP, SKIP, SKIP)).conduct().notebook)
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
@@ -176,13 +175,13 @@ def test_the_operator_decides_on_a_fault_before_levelling_the_mud(answer: str) -
 
 
 def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:
-    session = Session(tmp_path, [MOVED])
+    session = ScriptedTrials(tmp_path, [MOVED])
     session.robot.mode = "walking"
     assert session.conduct().robot.called[:2] == ["status", "stop"]
 
 
 def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -> None:
-    session = Session(tmp_path)
+    session = ScriptedTrials(tmp_path)
     session.robot.deaf = True
     (tmp_path / "old.mcap").touch()
     assert leave(session.bench.robot, session.bench.operator, tmp_path) == [tmp_path / "old.mcap"]
@@ -208,7 +207,7 @@ def test_another_configuration_or_daemon_of_a_real_robot_is_refused_and_the_robo
     def opened(version: str = "0.2", sections: str = "") -> tuple[DaemonsRobot, Notebook | str]:
         robot = DaemonsRobot(version, sections)
         monkeypatch.setattr(mud_trials, "DaemonRobot", lambda socket: robot)
-        session = session_module.Session(tmp_path, ScriptedOperator(), lambda done, total: None, Path("socket"))
+        session = Session(tmp_path, ScriptedOperator(), lambda done, total: None, Path("socket"))
         try:
             return robot, open_bench(session, PLAN, str).notebook
         except NotebookError as problem:
