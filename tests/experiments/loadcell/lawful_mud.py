@@ -12,6 +12,8 @@ from simulation.test_rig.stage_motion import ManualMotionParameters
 WIDTH_M, THICKNESS_M = 0.03, 0.004
 RATE_HZ, NOISE_N = 80.0, 0.008  # of the cell
 COUNT_M = 1e-5  # of the encoder
+LAG_S = 0.012  # of forces after positions, of a stage that is pushed by hand
+KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
 
 
 class LawfulMud:
@@ -20,8 +22,10 @@ class LawfulMud:
     At rest it keeps its load except for the fraction `relaxation`, which fades.
     """
 
-    def __init__(self, k_p: float, k_s: float, k_e: float, relaxation: float = 0.13) -> None:
-        self.k_p, self.k_s, self.k_e, self.relaxation = k_p, k_s, k_e, relaxation
+    relaxation = 0.13
+
+    def __init__(self, k_p: float = KNOWN["k_p"], k_s: float = KNOWN["k_s"], k_e: float = KNOWN["k_e"]) -> None:
+        self.k_p, self.k_s, self.k_e = k_p, k_s, k_e
         self.reset()
 
     def reset(self) -> None:
@@ -43,40 +47,19 @@ class LawfulMud:
         return (self._forward_n * left, self._upward_n * left) if wet_m else (0.0, 0.0)
 
 
-def feel(
-    plate: CarriedPlate,
-    kind: str,
-    seed: int,
-    speed_m_s: float = 0.1,
-    acceleration_m_s2: float = 2.0,
-) -> Recorded:
+def feel(plate: CarriedPlate, kind: str, seed: int, speed_m_s: float = 0.1, acceleration_m_s2: float = 2.0) -> Recorded:
     """Return one trial of a motorised stage that starts at a random time."""
-    random = Random(seed)
-    stage = PlateStage(plate, StageParameters(acceleration_m_s2))
-    stage.mean_force_n(0.0)
-    stage.move_over(plate, kind == SHEAR)
-    _start(stage, plate, kind, random.uniform(1.0, 1.3), speed_m_s)
-    return _heard(stage, kind, seed, random)
+    felt, _, _ = _feel(plate, kind, seed, StageParameters(acceleration_m_s2), speed_m_s)
+    return felt
 
 
-def feel_by_hand(
-    plate: CarriedPlate,
-    kind: str,
-    seed: int,
-    lag_s: float = 0.012,
-    jitter_s: float = 0.0015,
-) -> Recorded:
-    """Return one trial of a manual stage with an encoder; forces are stamped later by `lag_s`."""
-    random = Random(seed)
-    stage = PlateStage(plate, StageParameters(manual=ManualMotionParameters(), seed=seed))
-    stage.mean_force_n(0.0)
-    stage.move_over(plate, kind == SHEAR)
-    _start(stage, plate, kind, random.uniform(1.0, 1.3), 0.1)
-    felt = _heard(stage, kind, seed, random)
+def feel_by_hand(plate: CarriedPlate, kind: str, seed: int, jitter_s: float = 0.0015) -> Recorded:
+    """Return one trial of a manual stage with an encoder."""
+    felt, stage, random = _feel(plate, kind, seed, StageParameters(manual=ManualMotionParameters(), seed=seed))
     times_s = np.arange(0.003, stage.ends_s + 1.05, 0.01)
     positions_m = COUNT_M * np.round([stage.travelled_m(float(t)) / COUNT_M for t in times_s])
     reported = StagePositions(_jittered(times_s, jitter_s, random), positions_m)
-    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, positions=reported)
+    return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + LAG_S, positions=reported)
 
 
 def _jittered(times_s: Array, jitter_s: float, random: Random) -> Array:
@@ -84,15 +67,19 @@ def _jittered(times_s: Array, jitter_s: float, random: Random) -> Array:
     return np.asarray(np.maximum.accumulate(reported) + 1e-9 * np.arange(len(reported)))
 
 
-def _start(stage: PlateStage, plate: CarriedPlate, kind: str, start_s: float, speed_m_s: float) -> None:
+def _feel(
+    plate: CarriedPlate, kind: str, seed: int, parameters: StageParameters, speed_m_s: float = 0.1
+) -> tuple[Recorded, PlateStage, Random]:
+    random, stage = Random(seed), PlateStage(plate, parameters)
+    stage.mean_force_n(0.0)
+    stage.move_over(plate, kind == SHEAR)
+    start_s = random.uniform(1.0, 1.3)
     if kind == SHEAR:
         plate.depth_m = 0.03
         stage.drag(start_s, 0.2, speed_m_s)
     else:
         stage.insert(start_s, 0.03, speed_m_s, 3.0)
-
-
-def _heard(stage: PlateStage, kind: str, seed: int, random: Random) -> Recorded:
     times_s: Array = np.arange(1.0 / RATE_HZ, stage.ends_s + 1.0, 1.0 / RATE_HZ)
-    forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, NOISE_N) for t in times_s]
-    return Recorded(f"lawful/{kind}/{seed}", "lawful", kind, StageSettings(), times_s, np.array(forces_n), 0.0)
+    forces_n = np.array([stage.mean_force_n(float(t)) + random.gauss(0.0, NOISE_N) for t in times_s])
+    key = f"lawful/{kind}/{seed}"
+    return Recorded(key, "lawful", kind, StageSettings(), times_s, forces_n, 0.0), stage, random

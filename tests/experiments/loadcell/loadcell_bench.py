@@ -1,8 +1,7 @@
 """An emulated bench with everything that an experiment with a load cell needs, and a scripted operator."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import CellBench
-from experiments.loadcell.report import Results, evaluate_muds
 from experiments.loadcell.stage import CellTrial, SimulatedStage, TrialPlan
 from experiments.loadcell.strokes import INSERTION, StageSettings
 from experiments.loadcell.trials import measure, measure_all
@@ -22,13 +20,12 @@ from experiments.study.prompt import AutomaticOperator
 from experiments.study.session import Session
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench
-from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
+from simulation.test_rig.plate_stage import StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 from tests.experiments.loadcell.lawful_mud import LawfulMud
 from tests.scripted_operator import ScriptedOperator
 
 SETTINGS = StageSettings()
-KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
 
 
@@ -54,35 +51,32 @@ class Laboratory:
     def __init__(
         self,
         folder: Path,
-        muds: Mapping[str, CarriedPlate],
         operator: ScriptedOperator,
         trials: int = 1,
         amplifier: AmplifierParameters | None = None,
-        seed: int = 1,
         encoder: StageEncoderParameters | None = None,
     ) -> None:
         """Emulate a motorised stage, or with an `encoder` one that is pushed by hand."""
-        self.folder, self.operator = folder, operator
-        stage = None if encoder is None else StageParameters(manual=ManualMotionParameters(), seed=seed)
-        self.bench = EventfulBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
+        self.folder, self.operator, mud = folder, operator, LawfulMud()
+        stage = None if encoder is None else StageParameters(manual=ManualMotionParameters(), seed=1)
+        self.bench = EventfulBench(mud, folder / "cell", amplifier, stage, 1, encoder)
         self.port = LoadCellPort(str(folder / "cell"), 115200, LineFormat("number"), COUNTS)
         self.encoder = None
         if encoder is not None:
             settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count)
             self.encoder = StageEncoder(settings)
-        self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, notebook_plan(SETTINGS))
         self.cell = CellBench(
             session=Session(folder, operator, lambda done, total: None),
-            plan=self.plan,
+            plan=TrialPlan(("lawful",), trials, SETTINGS),
             notebook=self.notebook,
             port=self.port,
             clock=self.bench,
             encoder=self.encoder,
         )
         silent = AutomaticOperator(lambda message: None)
-        self.cell.stage = stage_of_it = SimulatedStage(SETTINGS, silent, self.cell.drain, self.bench, (), seed)
-        stage_of_it.plates = dict(muds)
+        self.cell.stage = stage_of_it = SimulatedStage(SETTINGS, silent, self.cell.drain, self.bench, (), 1)
+        stage_of_it.plates = {"lawful": mud}
 
     def at(self, after_s: float, happen: Callable[[], None]) -> None:
         self.bench.events.append((self.bench.now_s() + after_s, happen))
@@ -101,31 +95,8 @@ class Laboratory:
         self.notebook.write(trial.key, entry)
         return self.operator.reported
 
-    def evaluate_muds(self) -> Results:
-        return evaluate_muds(self.folder, self.notebook, self.plan, lambda done, total: None)
-
     def close(self) -> None:
         self.port.close()
         if self.encoder is not None:
             self.encoder.close()
         self.bench.close()
-
-
-Make = Callable[..., Laboratory]
-
-
-@contextmanager
-def laboratories(folder: Path) -> Iterator[Make]:
-    """Yield a function that makes a calibrated laboratory with a mud that follows the laws; close all at the end."""
-    made: list[Laboratory] = []
-
-    def build(operator: ScriptedOperator | None = None, **options: Any) -> Laboratory:
-        own_folder = folder / str(len(made))
-        own_folder.mkdir()
-        laboratory = Laboratory(own_folder, {"lawful": LawfulMud(**KNOWN)}, operator or ScriptedOperator(), **options)
-        made.append(laboratory)
-        return laboratory
-
-    yield build
-    for laboratory in made:
-        laboratory.close()

@@ -33,10 +33,9 @@ from simulation.test_rig.joint_cell import measure_stroke
 from simulation.test_rig.load_cell import Curve, measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE, clay_plate
 from simulation.test_rig.plate_stage import CarriedPlate
-from tests.experiments.loadcell.lawful_mud import THICKNESS_M, WIDTH_M, LawfulMud, feel, feel_by_hand
+from tests.experiments.loadcell.lawful_mud import KNOWN, THICKNESS_M, WIDTH_M, LawfulMud, feel, feel_by_hand
 
 SETTINGS = StageSettings()
-KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
 BOUND = 0.03
 
 
@@ -61,7 +60,7 @@ def test_coefficients_of_a_lawful_mud_and_of_clay_come_out_within_three_per_cent
     feel_trial: Callable[[CarriedPlate, str, int], Recorded], seed: int, water: float | None
 ) -> None:
     """On a motorised stage they are found from the force, by hand from an encoder; those of clay at the set speed."""
-    plate = LawfulMud(**KNOWN) if water is None else clay_plate(water)
+    plate = LawfulMud() if water is None else clay_plate(water)
     known = KNOWN if water is None else true_of_clay(water)
     trials = [feel_trial(plate, kind, seed + i) for i, kind in enumerate([INSERTION] * 3 + [SHEAR])]
     by_hand = feel_trial is feel_by_hand
@@ -128,7 +127,7 @@ def profile_n(depths_m: Array) -> Array:
 
 @pytest.fixture(scope="module")
 def insertion() -> Recorded:
-    return feel(LawfulMud(**KNOWN), INSERTION, 7)
+    return feel(LawfulMud(), INSERTION, 7)
 
 
 def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Recorded) -> None:
@@ -141,8 +140,7 @@ def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Reco
 def test_a_picture_names_each_trial_by_its_own_number(insertion: Recorded) -> None:
     """The first two trials were left out."""
     trials = [
-        analyse_trial(each._replace(key=f"mud/{each.kind}/3"))
-        for each in (insertion, feel(LawfulMud(**KNOWN), SHEAR, 8))
+        analyse_trial(each._replace(key=f"mud/{each.kind}/3")) for each in (insertion, feel(LawfulMud(), SHEAR, 8))
     ]
     coefficients = {name: gather_trials(trials, name, 0.0) for name in COEFFICIENTS}
     panels = draw_mud(trials, coefficients, SETTINGS).axes
@@ -151,7 +149,7 @@ def test_a_picture_names_each_trial_by_its_own_number(insertion: Recorded) -> No
 
 
 def test_a_stage_slower_than_its_setting_is_measured_and_reported() -> None:
-    mud = LawfulMud(**KNOWN)
+    mud = LawfulMud()
     reported = analyse([feel(mud, INSERTION, seed, speed_m_s=0.08) for seed in range(4)], look)
     assert gather_trials(reported, "k_p", 0.0).value == pytest.approx(KNOWN["k_p"], rel=0.04)
     for trial in reported:

@@ -1,6 +1,6 @@
 """Trials are measured, checked and recovered over the serial ports of an emulated amplifier and a stage's encoder."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,26 @@ from experiments.loadcell.trials import KEEP, WITHOUT, list_problems, record
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedStageEncoder, StageEncoderParameters
-from tests.experiments.loadcell.loadcell_bench import SETTINGS, Laboratory, Make, laboratories
+from tests.experiments.loadcell.loadcell_bench import SETTINGS, Laboratory
 from tests.scripted_operator import ScriptedOperator
+
+Make = Callable[..., Laboratory]
 
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    with laboratories(tmp_path) as build:
-        yield build
+    """Yield a function that makes a calibrated laboratory with a mud that follows the laws; close all at the end."""
+    made: list[Laboratory] = []
+
+    def build(operator: ScriptedOperator | None = None, **options: Any) -> Laboratory:
+        folder = tmp_path / str(len(made))
+        folder.mkdir()
+        made.append(Laboratory(folder, operator or ScriptedOperator(), **options))
+        return made[-1]
+
+    yield build
+    for laboratory in made:
+        laboratory.close()
 
 
 class Idle(Stage):
@@ -52,10 +64,8 @@ def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: 
     laboratory = make()
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
-    reported = laboratory.try_once()
-    assert any("plug" in each and "in again" in each for each in reported)
-    assert any("connected again" in each for each in reported)
-    assert any("unplugged during the trial" in each for each in reported)
+    reported = "\n".join(laboratory.try_once())
+    assert "in again" in reported and "connected again" in reported and "unplugged during the trial" in reported
     assert laboratory.notebook.entries["lawful/insertion/1"]["file"].endswith("_2.csv")
     assert len(list((laboratory.folder / RAW).iterdir())) == 2
     assert len(load_counted(laboratory.folder, laboratory.notebook, SETTINGS)) == 1
@@ -89,12 +99,11 @@ def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> N
     clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
     stretch = laboratory.cell.record(0.01, 0.1, 0.1)
     assert any("at its limit" in each for each in list_problems(AnalysedTrial(clipped), stretch, 0.0))
-    assert list_problems(AnalysedTrial(recorded), stretch, 0.0) == []
     # a coarse cell repeats its smallest force at rest, and any recording may end with its largest
     coarse = recorded._replace(forces_n=np.abs(recorded.forces_n).round(2))
     peak_n = recorded.forces_n.max() + 1.0
     ended = recorded._replace(forces_n=np.append(recorded.forces_n, peak_n), times_s=np.append(recorded.times_s, 1e3))
-    for sound in (coarse, ended):
+    for sound in (recorded, coarse, ended):
         assert list_problems(AnalysedTrial(sound), stretch, 0.0) == []
 
 
@@ -116,7 +125,7 @@ def measured(laboratory: Laboratory, *answers: str) -> list[CellTrial]:
 def test_the_operator_skips_a_trial_and_repeats_the_one_before(make: Make) -> None:
     laboratory = make(trials=2)
     asked = [trial.key for trial in measured(laboratory, GO_ON, REDO, GO_ON, SKIP, GO_ON, GO_ON)]
-    first, second, third, fourth = (trial.key for trial in laboratory.plan.list_trials())
+    first, second, third, fourth = (trial.key for trial in laboratory.cell.plan.list_trials())
     assert asked == [first, second, first, second, third, fourth]
     assert laboratory.notebook.entries[second] == {"skipped": True}
     assert laboratory.notebook.entries[first]["file"].endswith("_2.csv")
