@@ -1,7 +1,8 @@
 """Table I is measured through the daemon's calls; every walk stops in time, and its log gives the table."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import Any
 import pytest
 
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.bench_robot import BenchRobot
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.notebook import Notebook
 from experiments.study.prompt import SKIP
@@ -33,31 +33,33 @@ from tests.scripted_operator import ScriptedOperator
 
 SHORT = Trackway((("48.5", 0.2), ("53.1", 0.2)), trials=1, depths_m=(0.03,))
 TINY = Trackway((("48.5", 0.15),), trials=1, depths_m=(0.03,))
-OPENED = list[BenchRobot]()
 COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud after each
 
 
-def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
-    segments = [(length_m, MUDS[name]) for name, length_m in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
-    track = Track(segments * COPIES)
-    bench = simulated_bench(
-        ScriptedOperator(*answers),
-        Notebook(folder, {}),
-        simulated_configuration(),
-        track,
-        lambda trial, prepared: prepared * track.length_m / COPIES,
-        capture,
-    )
-    OPENED.append(bench.robot)
-    return bench
+MakeBench = Callable[..., Bench]
 
 
-@pytest.fixture(autouse=True)
-def closed_robots() -> Iterator[None]:
-    """Finish the logs of a test's robots."""
-    yield
-    while OPENED:
-        OPENED.pop().close()
+@pytest.fixture
+def make_bench(tmp_path: Path) -> Iterator[MakeBench]:
+    """Yield a function that makes a bench; finish the log of its robot in the end."""
+    opened = ExitStack()
+
+    def make(*answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
+        segments = [(length_m, MUDS[name]) for name, length_m in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
+        track = Track(segments * COPIES)
+        bench = simulated_bench(
+            ScriptedOperator(*answers),
+            Notebook(tmp_path, {}),
+            simulated_configuration(),
+            track,
+            lambda trial, prepared: prepared * track.length_m / COPIES,
+            capture,
+        )
+        opened.callback(bench.robot.close)
+        return bench
+
+    with opened:
+        yield make
 
 
 def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:
@@ -66,8 +68,8 @@ def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:
     return report_of(plan, counted_entries(bench.notebook), 0.12)
 
 
-def test_every_gait_is_walked_past_the_end_and_reported(tmp_path: Path) -> None:
-    bench = make_bench(tmp_path)
+def test_every_gait_is_walked_past_the_end_and_reported(make_bench: MakeBench) -> None:
+    bench = make_bench()
     report = walk_all(bench, SHORT)
     operator = bench.operator
     assert isinstance(operator, ScriptedOperator)
@@ -81,8 +83,8 @@ def test_every_gait_is_walked_past_the_end_and_reported(tmp_path: Path) -> None:
         assert 0.0 < strides[0]["position_cm"] < 12.0 < strides[-1]["position_cm"] < 40.0
 
 
-def test_a_walk_that_is_left_out_is_in_no_figure(tmp_path: Path) -> None:
-    bench = make_bench(tmp_path, SKIP)
+def test_a_walk_that_is_left_out_is_in_no_figure(make_bench: MakeBench) -> None:
+    bench = make_bench(SKIP)
     report = walk_all(bench, TINY)
     assert list(first_walks(TINY, counted_entries(bench.notebook))) == ["adaptive, trial 1"]
     assert report["walks"]["3 cm"] == [] and len(report["walks"]["adaptive"]) == 1
@@ -91,15 +93,15 @@ def test_a_walk_that_is_left_out_is_in_no_figure(tmp_path: Path) -> None:
     draw_trackway(report)
 
 
-def test_the_robot_does_not_walk_without_a_pose(tmp_path: Path) -> None:
-    bench = make_bench(tmp_path, capture=MotionCaptureParameters(rate_hz=0.001))
+def test_the_robot_does_not_walk_without_a_pose(make_bench: MakeBench) -> None:
+    bench = make_bench(capture=MotionCaptureParameters(rate_hz=0.001))
     with pytest.raises(BenchError, match="the position of the body is not known"):
         measure(bench, TINY, TINY.planned[0])
 
 
-def test_strides_without_a_pose_are_reported_and_not_counted(tmp_path: Path) -> None:
+def test_strides_without_a_pose_are_reported_and_not_counted(make_bench: MakeBench) -> None:
     capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
-    report = walk_all(make_bench(tmp_path, capture=capture), TINY)
+    report = walk_all(make_bench(capture=capture), TINY)
     assert report["strides_without_position"] > 0
     json.dumps(to_json(report), allow_nan=False)
 
@@ -129,8 +131,10 @@ class AlteredRobot(LockstepRobot):
     ("change", "why"),
     [("blind_from_s", "pose of the body is lost"), ("disarmed_from_s", "torque was switched off")],
 )
-def test_a_walk_without_a_pose_or_that_another_client_stops_is_invalid(change: str, why: str, tmp_path: Path) -> None:
-    bench = make_bench(tmp_path)
+def test_a_walk_without_a_pose_or_that_another_client_stops_is_invalid(
+    change: str, why: str, make_bench: MakeBench
+) -> None:
+    bench = make_bench()
     robot = bench.robot
     robot.__class__ = AlteredRobot
     assert isinstance(robot, AlteredRobot)

@@ -1,7 +1,5 @@
 """Table I from synthetic walks, compared with cells computed by hand, and from the simulated trackway."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -23,8 +21,8 @@ from simulation.mud.track import COMPARTMENT_M
 ARM_M = 0.12
 
 
-def stride(step_m: float, mud: str = "a", duration_s: float = 2.0, pushed_back_m: float = 0.0) -> WalkedStride:
-    return WalkedStride(mud, 0.0, 0.03, step_m, duration_s, pushed_back_m)
+def stride(step_m: float, mud: str = "a", pushed_back_m: float = 0.0) -> WalkedStride:
+    return WalkedStride(mud, 0.0, 0.03, step_m, 2.0, pushed_back_m)
 
 
 def walked(*steps_m: float) -> Walk:
@@ -61,36 +59,31 @@ def test_within_one_sd_uses_the_papers_sd_and_includes_its_edge(mean: float | No
     assert within_one_sd(mean, Speed(7.6, 0.5)) is inside
 
 
+def table_of(walks: list[Walk], *muds: str) -> dict[str, Any]:
+    return table_one({"3 cm": walks}, ARM_M, {}, {"mud_length_cm": dict.fromkeys(muds, 61.0)})
+
+
 def test_every_mud_has_the_same_weight_in_the_mean_over_muds_and_one_that_was_not_reached_has_none() -> None:
     walk = Walk([stride(0.14, "a"), stride(0.04, "b"), stride(0.04, "b")], "")
-
-    def mean(*muds: str) -> object:
-        settings = {"mud_length_cm": dict.fromkeys(muds, 61.0)}
-        return table_one({"3 cm": [walk]}, ARM_M, {}, settings)["mean_over_muds"]["3 cm"]
-
-    assert mean("a", "b") == {"mean": 4.5, "mean_all": 4.5}
-    assert mean("a", "b", "c") == {"mean": None, "mean_all": None}
+    assert table_of([walk], "a", "b")["mean_over_muds"]["3 cm"] == {"mean": 4.5, "mean_all": 4.5}
+    assert table_of([walk], "a", "b", "c")["mean_over_muds"]["3 cm"] == {"mean": None, "mean_all": None}
 
 
 def test_the_title_counts_the_trials_that_are_in_the_table() -> None:
     both, one = Walk([stride(0.1, "a"), stride(0.1, "b")], ""), walked(0.1)
-    settings = {"mud_length_cm": dict.fromkeys("ab", 61.0), "seeds": 3}
     for walks, count in (([both, one], "1 to 2 trials"), ([both, both, both], "3 trials"), ([both], "1 trial")):
-        table = speed_table(table_one({"3 cm": walks}, ARM_M, {}, settings))
-        assert table.title.endswith(f"mean ± sd of {count}")
+        assert speed_table(table_of(walks, "a", "b")).title.endswith(f" {count}")
 
 
 def test_the_table_shows_mean_and_deviation_next_to_the_papers() -> None:
     walks = [Walk([stride(step_m, mud) for mud in MUDS for _ in range(3)], "") for step_m in (0.14, 0.16)]
-    table = table_one({"3 cm": walks}, ARM_M, {}, {"mud_length_cm": dict.fromkeys(MUDS, 61.0)})
-    _, ours, _, paper = speed_table(table).cells()
+    _, ours, _, paper = speed_table(table_of(walks, *MUDS)).cells()
     assert ours == ["3 cm", *["7.50 ± 0.71"] * 3, "7.50"]
     assert paper[1:3] == ["7.6 ± 0.5, ours within", "2.1 ± 0.8, ours outside"]
 
 
 def test_each_stride_is_listed_in_centimetres() -> None:
-    walk = Walk([WalkedStride("a", 0.614, 0.0305, 0.04, 2.5, 0.0)], "")
-    table = table_one({"3 cm": [walk]}, ARM_M, {}, {"mud_length_cm": {"a": 61.0}})
+    table = table_of([Walk([WalkedStride("a", 0.614, 0.0305, 0.04, 2.5, 0.0)], "")], "a")
     assert list(table["walks"]["3 cm"][0][0].values()) == ["a", 61.4, 3.05, 4.0, 2.5, "slippage"]
 
 
