@@ -204,23 +204,22 @@ class DaemonsRobot(AskedRobot):
 def test_another_configuration_or_daemon_of_a_real_robot_is_refused_and_the_robot_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def opened(version: str = "0.2", sections: str = "") -> tuple[DaemonsRobot, Notebook | str]:
-        robot = DaemonsRobot(version, sections)
-        monkeypatch.setattr(mud_trials, "DaemonRobot", lambda socket: robot)
-        session = Session(tmp_path, ScriptedOperator(), lambda done, total: None, Path("socket"))
-        try:
-            return robot, open_bench(session, PLAN, str).notebook
-        except NotebookError as problem:
-            return robot, str(problem)
+    robots: list[DaemonsRobot] = []
 
-    robot, notebook = opened()
-    assert isinstance(notebook, Notebook) and not robot.closed
-    notebook.write("47.6/1", {})
+    def opened(version: str = "0.2", sections: str = "") -> Notebook:
+        robots.append(DaemonsRobot(version, sections))
+        monkeypatch.setattr(mud_trials, "DaemonRobot", lambda socket: robots[-1])
+        session = Session(tmp_path, ScriptedOperator(), lambda done, total: None, Path("socket"))
+        return open_bench(session, PLAN, str).notebook
+
+    opened().write("47.6/1", {})
     stiffness = "sweep_stiffness_nm_rad"
-    for (robot, refused), key in (
-        (opened("0.3"), "daemon.version = 0.2"),
-        (opened(sections=f"[gains]\n{stiffness} = 9.0"), f"configuration.gains.{stiffness} = (none)"),
+    for version, sections, key in (
+        ("0.3", "", "daemon.version = 0.2"),
+        ("0.2", f"[gains]\n{stiffness} = 9.0", f"configuration.gains.{stiffness} = (none)"),
     ):
-        assert isinstance(refused, str) and key in refused and robot.closed
-    robot, notebook = opened(sections="# a comment\n")
-    assert isinstance(notebook, Notebook) and list(notebook.entries) == ["47.6/1"]
+        with pytest.raises(NotebookError) as refused:
+            opened(version, sections)
+        assert key in str(refused.value)
+    assert list(opened(sections="# a comment\n").entries) == ["47.6/1"]
+    assert [robot.closed for robot in robots] == [False, True, True, False]
