@@ -1,7 +1,13 @@
 """Trials on a Dask cluster of real processes: the same digits, lost workers, and clusters that cannot be used."""
 
 import gc
+import json
+import os
 import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -12,12 +18,68 @@ from experiments.study.provenance import PACKAGES
 from experiments.study.workers import WorkersError, run_locally, run_parallel
 from experiments.trackway.simulated_walk import walk_in_mud
 from tests.folders import ROOT
+from tests.waiting import LONGEST_S, wait_until
 
-pytest.importorskip("distributed", reason="needs the extra cluster")
+distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
 from experiments.study import cluster_workers  # noqa: E402 - it imports distributed
 from experiments.study.cluster_workers import run_on_cluster  # noqa: E402
-from tests.experiments.study.running_cluster import running_cluster  # noqa: E402
+
+LOCAL = "127.0.0.1"
+
+
+class Cluster:
+    """Owns a Dask scheduler and its workers as processes of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file, self._log = folder / "scheduler.json", folder / "cluster.log"
+        port = ("--host", LOCAL, "--port", "0", "--no-dashboard", "--no-show")
+        self.scheduler = self._start("scheduler", *port, "--scheduler-file", str(self._file))
+        self.workers: list[subprocess.Popen[bytes]] = []
+
+    @property
+    def address(self) -> str:
+        wait_until(self._is_announced)
+        return str(json.loads(self._file.read_bytes())["address"])
+
+    def _is_announced(self) -> bool:
+        return self._file.exists() and self._file.read_bytes().rstrip().endswith(b"}")
+
+    def add_worker(self, environment: Mapping[str, str] = {}, folder: Path = ROOT) -> subprocess.Popen[bytes]:
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", LOCAL, "--memory-limit", "0")
+        self.workers.append(self._start("worker", self.address, *options, environment=environment, folder=folder))
+        return self.workers[-1]
+
+    def wait_for_workers(self) -> None:
+        with distributed.Client(self.address, timeout=LONGEST_S) as client:
+            client.wait_for_workers(len(self.workers), timeout=LONGEST_S)
+
+    def _start(
+        self, role: str, *options: str, environment: Mapping[str, str] = {}, folder: Path = ROOT
+    ) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", *options]
+        with self._log.open("ab") as log:
+            return subprocess.Popen(command, cwd=folder, env=os.environ | environment, stdout=log, stderr=log)
+
+    def end(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+        for process in (*self.workers, self.scheduler):
+            process.wait()
+
+
+@contextmanager
+def running_cluster(folder: Path, workers: int = 0) -> Iterator[Cluster]:
+    cluster = Cluster(folder)
+    try:
+        for _ in range(workers):
+            cluster.add_worker()
+        if workers:
+            cluster.wait_for_workers()
+        yield cluster
+    finally:
+        cluster.end()
+
 
 WALKS = [partial(walk_in_mud, 2800.0, seed, 0.02, count=1) for seed in range(1, 4)]
 
