@@ -1,4 +1,4 @@
-"""The plate's closed forms against a dense grid, exact polygon clipping, and a derivation in sympy."""
+"""The plate's closed forms against a dense grid, exact polygon clipping, and virtual work."""
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -166,42 +165,28 @@ def test_the_closed_forms_are_exact(
     assert np.all(np.abs(np.array(plate) - exact) <= tolerance)
 
 
-# the mechanics, derived
-
-ALPHA, BETA, LENGTH, DROP, U, S = sympy.symbols("alpha beta l h u s", real=True)
-ROTATION = sympy.Matrix([[1, 0, 0], [0, sympy.cos(BETA), -sympy.sin(BETA)], [0, sympy.sin(BETA), sympy.cos(BETA)]])
-POSITION = ROTATION * sympy.Matrix([(LENGTH + U) * sympy.sin(ALPHA), (LENGTH + U) * sympy.cos(ALPHA), S - DROP])
-NORMAL = POSITION.diff(U).cross(POSITION.diff(S))  # of two unit vectors in the plate
-
-
-def is_zero(expression: sympy.Expr) -> bool:
-    return bool(sympy.simplify(expression) == 0)
-
-
-def test_the_normal_is_a_unit_vector_that_points_forward() -> None:
-    assert is_zero(NORMAL.dot(NORMAL) - 1)
-    assert is_zero(NORMAL[0] - sympy.cos(ALPHA))
-
-
-def test_a_load_along_the_normal_turns_the_joints_by_its_arm_and_by_its_drop_times_the_sine() -> None:
-    below_arm = DROP - S
-    assert is_zero(NORMAL.dot(POSITION.diff(ALPHA)) - (LENGTH + U))
-    assert is_zero(NORMAL.dot(POSITION.diff(BETA)) + below_arm * sympy.sin(ALPHA))
+def levers_m(pose: Pose, u: float, s: float) -> Array:
+    """Return the torques on sweep and adduction of a unit load across the plate at a point of it, by virtual work."""
+    g, moved_rad = pose.geometry, 1e-6 * np.eye(2)
+    here_rad, arm_m = np.array([pose.sweep_rad, pose.adduction_rad]), [0.0, g.flipper_length_m + u, s - g.drop_m]
+    paths_m = [(rotation(*(here_rad + each)) - rotation(*(here_rad - each))) @ arm_m / 2e-6 for each in moved_rad]
+    levers: Array = np.array(paths_m) @ rotation(*here_rad)[:, 0]
+    return levers
 
 
 @given(poses)
 @example(CORNER)
 @example(TOP_CORNER_DRY)
 def test_cross_coupling_is_the_ratio_of_the_torques_of_the_triangles_pressure(pose: Pose) -> None:
-    g, plate, sine = pose.geometry, pose.plate(), sin(pose.sweep_rad)
-    values = [float(value) for value in exact_integrals(g, *attitude(pose))]
-    sweep = g.flipper_length_m * values[3] + values[4]
-    adduction = -sine * (g.drop_m * values[3] - values[5])
+    g, plate = pose.geometry, pose.plate()
+    *_, load, outward, upward = (float(value) for value in exact_integrals(g, *attitude(pose)))
+    middle, by_u, by_s = (levers_m(pose, *point) for point in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    sweep, adduction = load * middle + outward * (by_u - middle) + upward * (by_s - middle)
     ratio = cross_coupling(g, plate, pose.sweep_rad)
     if stance_moment_m4(g, plate) > 0.0:
         assert ratio * sweep == pytest.approx(adduction, rel=1e-6, abs=1e-12)
     else:
-        assert ratio == pytest.approx(-sine * g.drop_m / g.flipper_length_m)  # of the edge's middle
+        assert ratio == pytest.approx(-sin(pose.sweep_rad) * g.drop_m / g.flipper_length_m)  # of the edge's middle
 
 
 # moments, units and limits
