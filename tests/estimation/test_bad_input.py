@@ -76,11 +76,6 @@ def test_the_unaltered_walk_gives_every_coefficient_and_without_a_pose_consisten
         assert isnan(body_m) or all(each.valid and not each.at_least for each in estimates)
 
 
-@pytest.mark.parametrize("phase", Phase)
-def test_a_single_sample_closes_nothing(phase: Phase, method: Method) -> None:
-    assert fed(new_estimator(method), [(0.0, phase, 0.1, -0.5, -5.0, -5.0)]) == []
-
-
 # one bad stroke in a good walk
 
 
@@ -121,28 +116,6 @@ def test_an_altered_stroke_gives_no_value(stroke: Phase, altered: str, method: M
         assert not estimate.valid or estimate.at_least or estimate.value < NO_MUD_N_M3
 
 
-@pytest.mark.parametrize("stroke", COEFFICIENT)
-def test_a_stroke_that_is_left_out_closes_no_stride(stroke: Phase, method: Method) -> None:
-    assert fed(new_estimator(method), altered_walk(stroke, lambda rows: [])) == []
-
-
-@pytest.mark.parametrize("stroke", COEFFICIENT)
-def test_a_stroke_that_runs_backward_gives_nothing_or_the_law_that_its_pairs_still_keep(
-    stroke: Phase, method: Method
-) -> None:
-    """Depths and forces still belong together; only their order is wrong."""
-
-    def backward(rows: list[Row]) -> list[Row]:
-        return [(row[0], *other[1:]) for row, other in zip(rows, rows[::-1], strict=True)]
-
-    good = getattr(fed(new_estimator(method), walk())[0], COEFFICIENT[stroke]).value
-    strides = fed(new_estimator(method), altered_walk(stroke, backward))
-    assert_all_consistent(strides)
-    for stride in strides:
-        estimate = getattr(stride, COEFFICIENT[stroke])
-        assert not estimate.valid or estimate.at_least or estimate.value == pytest.approx(good, rel=0.25)
-
-
 def stuck(fraction: float) -> Callable[[list[Row]], list[Row]]:
     """Let the sweep motor give 10 A throughout and the flipper stop after that fraction of the stance."""
 
@@ -163,21 +136,6 @@ def test_a_motor_at_its_limit_gives_a_bound_or_the_strength_of_mud_that_it_moved
         assert moved or not stride.k_s.valid or stride.k_s.at_least
         if stride.k_s.valid:
             assert stride.k_s.value == pytest.approx(good * 10.0 / 9.0, rel=0.15 if moved else 0.25)
-
-
-# whole walks in disorder
-
-
-def test_a_walk_backward_in_time_is_survived_and_a_clock_that_stands_still_closes_nothing(method: Method) -> None:
-    assert_all_consistent(fed(new_estimator(method), walk()[::-1]))
-    assert fed(new_estimator(method), [(1.0, *row[1:]) for row in walk()]) == []
-
-
-def test_phases_in_any_order_leave_the_next_good_stride_as_it_is(method: Method) -> None:
-    mud, rows = new_estimator(method), walk()
-    fed(mud, [(0.001 * i, phase, 0.1, -0.5, -5.0, -5.0 - i) for i, phase in enumerate([*Phase, *reversed(Phase)])])
-    mud.reset()
-    assert repr(fed(mud, rows)) == repr(fed(new_estimator(method), rows))
 
 
 anything = st.floats()
