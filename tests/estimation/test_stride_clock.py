@@ -6,12 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait.gait import Gait
-from control.geometry import FlipperGeometry
-from control.parameters.gait_parameters import GaitParameters
 from control.records import Phase
 from estimation.stride_clock import BORDERS, STROKES, Change, StrideClock
-from firmware_host.configuration.gait_file import PROTOCOLS
 
 REST, INSERTION, STANCE = Phase.REST, Phase.INSERTION, Phase.STANCE
 EXTRACTION, SWING, PAUSE = Phase.EXTRACTION, Phase.SWING, Phase.PAUSE
@@ -28,10 +24,6 @@ def changes(phases: Iterable[Phase], clock: StrideClock | None = None, period_s:
             clock.begin(tick * period_s)
         seen.append(change)
     return seen
-
-
-def closes(phases: Iterable[Phase]) -> int:
-    return sum(change.closes_stride for change in changes(phases))
 
 
 @pytest.mark.parametrize("border", [SWING, INSERTION])
@@ -54,23 +46,10 @@ def test_a_stride_with_a_recovery_closes_with_the_swing_after_it(before: list[Ph
     assert seen[-3].begins_stride is False
 
 
-def test_a_recovery_that_ends_in_rest_closes_nothing() -> None:
-    assert closes([INSERTION, STANCE, EXTRACTION, Phase.RECOVERY, REST, SWING, INSERTION]) == 0
-
-
-def test_a_stride_that_rest_cuts_short_does_not_close() -> None:
-    for done in ([INSERTION], [INSERTION, STANCE], [INSERTION, STANCE, EXTRACTION]):
-        assert closes([*done, REST]) == 0
-        assert closes([*done, REST, SWING, INSERTION]) == 0
-
-
-@pytest.mark.parametrize("gait", [GaitParameters(), PROTOCOLS["single_flipper"]])
-def test_every_stride_of_the_gait_closes(gait: GaitParameters) -> None:
-    walk, phases = Gait(gait, FlipperGeometry()), list[Phase]()
-    walk.reset(0.03)
-    while walk.stride < 4:
-        phases.append(walk.step(1.0 / 380.0).phase)
-    assert closes(phases) == 4
+@pytest.mark.parametrize("strokes", [1, 2, 3, 4])
+def test_a_stride_that_rest_cuts_short_does_not_close(strokes: int) -> None:
+    begun = [INSERTION, STANCE, EXTRACTION, Phase.RECOVERY][:strokes]
+    assert not any(change.closes_stride for change in changes([*begun, REST, SWING, INSERTION]))
 
 
 def test_durations_are_from_change_to_change() -> None:
