@@ -22,7 +22,6 @@ from tests.estimation.synthetic_strides import (
     WEIGHTLESS,
     Moment,
     Row,
-    noisy,
     strides_of,
     update,
     walked,
@@ -195,42 +194,12 @@ def test_the_trigger_finds_the_surface_too_deep_by_its_force_over_the_slope_whic
     assert stride.k_s.value / mud.k_s == pytest.approx((0.03 / (0.03 - late_m)) ** 2)
 
 
-# noise, duplicates, gaps
-
-
-def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
-    samples = triggered(walked(), MUD)
-    scores = []
-    for seed in range(30):
-        stride = one(noisy(samples, seed, 0.1))
-        found = ((stride.k_p, MUD.k_p), (stride.k_s, MUD.k_s), (stride.k_e, MUD.k_e))
-        scores.append([(estimate.value - truth) / estimate.std_error for estimate, truth in found])
-    assert np.abs(scores).max() < 5.0
-    assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # in k_p only the jump adds to the error
-
-
-def test_the_law_is_found_from_every_other_sample() -> None:
-    samples = walked()
-    start = samples.index(first_below(samples, MUD.surface_m)) % 2
-    thinned = [row if index % 2 == start else row.lost() for index, row in enumerate(triggered(samples, MUD))]
-    assert_found(one(thinned), MUD)
-
-
 # gravity and inertia
 
 
 @pytest.mark.parametrize(("mass", "gait"), [(WEIGHTLESS, PROTOCOLS["single_flipper"]), (HEAVY, GAIT)])
 def test_the_law_is_found_through_pauses_and_without_gravity_and_inertia(mass: ArmMass, gait: GaitParameters) -> None:
     assert_found(one(triggered(walked(gait=gait), MUD, mass), estimator(mass)), MUD)
-
-
-def test_unknown_velocities_leave_only_inertia_in() -> None:
-    slow = ArmMass(0.3, 0.07, 0.0, 0.0)
-    samples = [
-        row._replace(sweep=row.sweep._replace(velocity_rad_s=nan), adduction=row.adduction._replace(velocity_rad_s=nan))
-        for row in triggered(walked(), MUD, slow)
-    ]
-    assert_found(one(samples, estimator(HEAVY)), MUD)
 
 
 # the body's drag
@@ -270,6 +239,3 @@ def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
         assert estimate.reason
     assert stride.surface_m == 0.0
     assert stride.released
-
-
-# both flippers
