@@ -8,7 +8,7 @@ import pickle
 from collections.abc import Sequence
 from functools import cache, partial
 from math import exp, inf, isfinite, isnan, log, nan, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -58,10 +58,6 @@ def walked(knowledge: MudKnowledge, *strides: StrideEstimate) -> MudEstimate:
     for each in strides:
         mud_estimate = knowledge.update([each])
     return mud_estimate
-
-
-def stride_with(**estimates: Any) -> StrideEstimate:
-    return stride(**estimates)
 
 
 def found(coefficient: Coefficient | None) -> Coefficient:
@@ -119,16 +115,10 @@ class TestOneMud:
             at = np.array([1.0, log_depth])
             assert line.expected(log_depth) == pytest.approx((at @ solution, at @ covariance @ at), rel=1e-6)
 
-    def test_an_estimate_at_another_depth_is_what_the_line_expects_there(self) -> None:
-        line = line_through(readings(6, 1))
-        k, std_error = line.coefficient().at(0.05)
-        expected, variance = line.expected(log(0.05))
-        assert (log(k), std_error / k) == pytest.approx((expected, sqrt(variance)))
-
     @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
     @given(st.lists(st.tuples(st.floats(0.95, 1.05), st.floats(0.0, 0.3)), min_size=1, max_size=8))
     def test_strides_are_merged_by_their_precision(self, name: str, rows: list[tuple[float, float]]) -> None:
-        mud_estimate = after(*(stride_with(**{name: reported(1e6 * value, relative)}) for value, relative in rows))
+        mud_estimate = after(*(stride(**{name: reported(1e6 * value, relative)}) for value, relative in rows))
         weights = [1.0 / (relative**2 + REPEATABILITY**2) for _, relative in rows]
         mean = float(np.average([log(value) for value, _ in rows], weights=weights))
         merged = found(getattr(mud_estimate, name))
@@ -145,15 +135,6 @@ class TestOneMud:
             uncertainties.append(k_s.std_error / k_s.value)
         expected = [REPEATABILITY / sqrt(min(count, REMEMBERED_STRIDES)) for count in range(1, 101)]
         assert uncertainties == pytest.approx(expected)
-
-    def test_a_stride_that_hardly_knows_does_not_push_out_those_that_do(self) -> None:
-        known = [K_S_KNOWN] * 20
-        before, later = (
-            found(after(*known).k_s),
-            found(after(*known, stride(k_s=reported(1.3 * K_S, 0.5))).k_s),
-        )
-        assert later.value == pytest.approx(before.value, rel=0.01)
-        assert later.std_error <= 1.07 * before.std_error
 
     def test_a_slow_change_is_followed_without_calling_it_a_boundary(self) -> None:
         knowledge = MudKnowledge()
@@ -270,12 +251,12 @@ class TestBoundaries:
         if not 0.75 < step < 1.3:
             assert both.uncertainty == pytest.approx(sqrt((REPEATABILITY**2 + REPORTED**2) / 2.0), rel=0.01)
 
-    @pytest.mark.parametrize("step", [0.5, 0.7, 0.8, 1.25, 1.43, 2.0])
+    @pytest.mark.parametrize("step", [0.5, 0.8, 1.25, 2.0])
     @pytest.mark.parametrize("name", ["k_p", "k_s"])
     def test_without_scatter_the_first_stride_of_another_mud_stands_alone_and_the_second_joins_it(
         self, name: str, step: float
     ) -> None:
-        old, new = (stride_with(**{name: reported(1e6 * factor)}) for factor in (1.0, step))
+        old, new = (stride(**{name: reported(1e6 * factor)}) for factor in (1.0, step))
         knowledge = MudKnowledge()
         assert not walked(knowledge, *[old] * 12).boundary
         for strides, boundary in ((1, True), (2, False), (3, False)):
@@ -301,7 +282,7 @@ class TestBoundaries:
         assert mud_estimate.boundary and is_value(mud_estimate.k_s, new.k_s.value)
         assert found(mud_estimate.k_s).strides == 2
 
-    @pytest.mark.parametrize("factor", [0.01, 0.5, 2.0, 50.0])
+    @pytest.mark.parametrize("factor", [0.01, 2.0])
     def test_after_one_wild_stride_the_next_one_brings_the_memory_back(self, factor: float) -> None:
         knowledge, known = MudKnowledge(), [ALL_KNOWN] * 5
         wild = walked(knowledge, *known, stride(reported(K_P), reported(K_S * factor), reported(K_E)))
@@ -322,7 +303,7 @@ class TestBoundaries:
         known = {"k_p": reported(K_P), "k_s": reported(K_S), "k_e": reported(K_E)}
         new = known | {changed: reported(2.0 * known[changed].value), also: reported(1.05 * known[also].value)}
         first, second, silent = (
-            after(*[ALL_KNOWN] * 8, *(stride_with(**estimates) for estimates in strides))
+            after(*[ALL_KNOWN] * 8, *(stride(**estimates) for estimates in strides))
             for strides in ([new], [new, new], [new | {also: NOT_REPORTED}])
         )
         assert (found(getattr(first, also)).strides, first.boundary) == (1, True)
@@ -336,13 +317,6 @@ class TestBoundaries:
         assert not mud_estimate.boundary
         assert [found(k).strides for k in mud_estimate[:3]] == [10, 10, 2]
         assert is_value(mud_estimate.k_e, 2.0 * K_E)
-
-    def test_a_coefficient_missing_in_the_new_muds_is_not_remembered(self) -> None:
-        knowledge = MudKnowledge()
-        walked(knowledge, *[TWO_KNOWN] * 4)
-        for k_p in (3.0 * K_P, 0.3 * K_P, 3.0 * K_P):
-            mud_estimate = walked(knowledge, stride(reported(k_p)))
-            assert mud_estimate.k_s is None
 
     def test_a_stride_that_gives_neither_k_p_nor_k_s_settles_no_alarm(self) -> None:
         knowledge = MudKnowledge()
@@ -373,11 +347,14 @@ class TestBothFlippers:
         return knowledge.mud_estimate
 
     def test_where_they_agree_they_are_merged_by_precision(self) -> None:
-        mud_estimate = self.estimated(reported(K_P), reported(1.02 * K_P, 0.1), strides=1)
+        left, right = reported(K_P)._replace(std_error=0.05 * K_P), reported(1.02 * K_P, 0.1)
+        mud_estimate = self.estimated(left, right, strides=1)
         variances = np.array([REPEATABILITY**2, REPEATABILITY**2 + 0.1**2])
+        common = 0.05**2 / variances[0] / np.sum(1.0 / variances)  # all strides of the left one have it
         together = found(mud_estimate.k_p)
         assert together.value == pytest.approx(K_P * exp(np.average([0.0, log(1.02)], weights=1.0 / variances)))
-        assert together.std_error / together.value == pytest.approx(sqrt(1.0 / np.sum(1.0 / variances)))
+        assert together.repeatability / together.value == pytest.approx(sqrt(1.0 / np.sum(1.0 / variances)))
+        assert together.std_error / together.value == pytest.approx(sqrt(1.0 / np.sum(1.0 / variances) + common))
         assert together.strides == 2
 
     def test_a_difference_beyond_the_errors_stays_in_the_error(self) -> None:
@@ -437,25 +414,18 @@ class TestLowerBounds:
             assert mud_estimate.k_s == after(*known).k_s
             assert not mud_estimate.boundary
 
-    def test_a_bound_well_above_the_remembered_value_gives_a_stronger_mud(self) -> None:
-        known = ALL_KNOWN
-        mud_estimate = after(*[known] * 8, stride(k_s=bound(1.5 * K_S)))
-        assert mud_estimate.boundary
-        assert is_bound(mud_estimate.k_s, 1.5 * K_S)
-        assert mud_estimate.k_p is None and mud_estimate.k_e is None
-
-    def test_a_stronger_mud_by_a_bound_stays_until_a_value_comes(self) -> None:
+    def test_a_bound_well_above_the_remembered_value_is_a_stronger_mud_until_a_value_comes(self) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *[TWO_KNOWN] * 8)
-        for estimate in (*[bound(1.5 * K_S)] * 3, NOT_REPORTED):
+        first = walked(knowledge, stride(k_s=bound(1.5 * K_S)))
+        assert first.boundary and first.k_p is None and is_bound(first.k_s, 1.5 * K_S)
+        for estimate in (bound(1.5 * K_S), NOT_REPORTED):
             assert is_bound(walked(knowledge, stride(reported(K_P), estimate)).k_s, 1.5 * K_S)
         assert is_value(walked(knowledge, stride(reported(K_P), reported(1.8 * K_S))).k_s, 1.8 * K_S)
 
     def test_a_wild_bound_is_taken_back_by_a_value_that_fits_the_memory(self) -> None:
-        known = [K_S_KNOWN] * 8
-        mud_estimate = after(*known, stride(k_s=bound(3.0 * K_S)), known[0])
-        assert is_value(mud_estimate.k_s, K_S)
-        assert found(mud_estimate.k_s).strides == 9
+        k_s = after(*[K_S_KNOWN] * 8, stride(k_s=bound(3.0 * K_S)), K_S_KNOWN).k_s
+        assert is_value(k_s, K_S) and found(k_s).strides == 9
 
     def test_the_greatest_bound_that_a_second_stride_confirms_counts(self) -> None:
         def kept(*factors: float) -> Coefficient | None:
@@ -546,22 +516,19 @@ class TestDepthLaw:
 
 
 NONSENSE = [
-    Estimate(value, error, 50, True, repeatability=error)
-    for value, error in [
-        (nan, 0.1e6),
-        (1e6, nan),
-        (inf, 1.0),
-        (-inf, 1.0),
-        (1e6, inf),
-        (1e6, -1.0),
-        (1e6, 1.1e6),
-        (0.0, 0.0),
-        (-1e6, 0.1e6),
-        (1e-300, 0.0),
-        (1e300, 1.0),
-        (5e-324, 5e-324),
+    Estimate(value, std_error, 50, True, repeatability=repeatability)
+    for value, std_error, repeatability in [
+        (nan, 0.1e6, 0.1e6),
+        (0.99e2, 0.0, 0.0),
+        (1.01e10, 0.0, 0.0),
+        (1e6, 0.1e6, nan),
+        (1e6, 0.1e6, -1.0),
+        (1e6, 0.1e6, 1.01e6),
+        (1e6, nan, 0.1e6),
+        (1e6, -1.0, 0.1e6),
+        (1e6, inf, 0.1e6),
     ]
-] + [Estimate(1e6, error, 50, True, repeatability=0.1e6) for error in (nan, inf, -0.2e6, -1e200)]
+]
 numbers = st.floats() | st.floats(1e4, 1e8)
 anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), st.just(""), st.booleans())
 sound = st.builds(reported, st.floats(1e4, 1e8), st.floats(0.0, 0.6)) | st.just(NOT_REPORTED)
@@ -579,7 +546,7 @@ class TestBadInput:
         assert after(*known, stride(bad, bad, bad)) == after(*known)
         assert after(stride(bad, bad, bad)) == NOTHING_KNOWN
 
-    @pytest.mark.parametrize("depth_m", [nan, inf, -inf, 0.0, -0.01, 1e-9, 0.004, 1e9])
+    @pytest.mark.parametrize("depth_m", [nan, -0.01, 0.004, 0.51])
     def test_an_impossible_depth_changes_nothing(self, depth_m: float) -> None:
         known = [ALL_KNOWN] * 3
         assert after(*known, stride(reported(K_P), reported(K_S), bound(9 * K_E), depth_m)) == after(*known)

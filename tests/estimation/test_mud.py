@@ -119,24 +119,24 @@ def test_the_paper_adds_the_drag_only_if_configured() -> None:
     assert left.drag_n == 3.5
 
 
-@pytest.mark.parametrize(("free_body", "mass_kg", "lift_n"), [(False, 1.0, inf), (True, 1.0, 2.45), (True, 0.0, 0.0)])
-def test_a_free_body_is_lifted_by_half_of_its_weight_and_one_of_unknown_mass_by_any_force(
-    free_body: bool, mass_kg: float, lift_n: float
+@pytest.mark.parametrize(
+    ("configured", "mass_kg", "base", "lift_n"),
+    [
+        ({"fixed_base": True}, 1.0, Base.FIXED, inf),
+        ({"free_body": True}, 1.0, Base.FREE, 2.45),  # half of its weight
+        ({"free_body": True}, 0.0, Base.FREE, 0.0),  # of an unknown mass: any force
+    ],
+)
+def test_the_default_gets_base_drag_surface_error_and_what_lifts_a_free_body(
+    configured: dict[str, bool], mass_kg: float, base: Base, lift_n: float
 ) -> None:
-    parameters = EstimationParameters(free_body=free_body)
-    for flipper in MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, body_mass_kg=mass_kg).flippers:
-        assert isinstance(flipper, FlipperEstimator)
-        assert flipper.lift_n == pytest.approx(lift_n, rel=0.01)
-
-
-@pytest.mark.parametrize(("fixed_base", "base"), [(False, Base.FREE), (True, Base.FIXED)])
-def test_the_default_gets_base_drag_and_surface_error(fixed_base: bool, base: Base) -> None:
-    parameters = EstimationParameters(fixed_base=fixed_base, surface_error_m=0.004)
-    mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0)
+    parameters = EstimationParameters(surface_error_m=0.004, **configured)
+    mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0, body_mass_kg=mass_kg)
     for flipper, name in zip(mud.flippers, FLIPPERS, strict=True):
         assert isinstance(flipper, FlipperEstimator)
         assert (flipper.flipper, flipper.base) == (name, base)
         assert (flipper.drag_n, flipper.surface_error_m) == (3.5, 0.004)
+        assert flipper.lift_n == pytest.approx(lift_n, rel=0.01)
 
 
 # what is known from stride to stride
@@ -164,13 +164,6 @@ def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
     closed_m = [0.1 * stride.t_end_s for stride in strides if stride.flipper == "left"]
     assert [row.position_m for row in rows] == pytest.approx(closed_m, abs=PIECE_M / 2.0)
     assert [row.k_p.strides for row in rows if row.k_p is not None] == [2] * STRIDES
-
-
-def test_without_a_pose_there_is_an_estimate_and_no_map() -> None:
-    mud = estimator()
-    strides_of(mud, walk(1), walk(2), speed_m_s=nan)
-    assert mud.mud_estimate.k_p is not None
-    assert mud.map.rows() == ()
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
