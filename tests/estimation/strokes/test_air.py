@@ -21,11 +21,6 @@ def swung(friction_nm: float, inertia_nm: float = 0.0, air: AirSwing | None = No
     return air
 
 
-def test_before_any_swing_the_friction_is_unknown() -> None:
-    air = AirSwing()
-    assert (air.friction_nm, air.std_error_nm) == (0.0, UNKNOWN_FRICTION_NM)
-
-
 @pytest.mark.parametrize("friction_nm", [0.0, 0.02, 0.06, 0.12])
 @pytest.mark.parametrize("inertia_nm", [0.0, 0.3])
 def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm: float) -> None:
@@ -71,7 +66,8 @@ def test_only_mud_pulls_harder_than_any_friction(extraction_nm: float, is_pull: 
     assert swung(0.05).is_pull(extraction_nm) is is_pull
 
 
-def test_a_reset_forgets_the_friction() -> None:
-    air = swung(0.05)
-    air.reset()
-    assert (air.friction_nm, air.std_error_nm, air.is_air) == (0.0, UNKNOWN_FRICTION_NM, True)
+def test_before_any_swing_and_after_a_reset_the_friction_is_unknown() -> None:
+    reset = swung(0.05)
+    reset.reset()
+    for air in (AirSwing(), reset):
+        assert (air.friction_nm, air.std_error_nm, air.is_air) == (0.0, UNKNOWN_FRICTION_NM, True)

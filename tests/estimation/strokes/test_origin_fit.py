@@ -121,28 +121,13 @@ def test_the_standard_error_is_statsmodels_newey_west_or_the_plain_one_whichever
     assert ours.std_error == pytest.approx(student * sqrt((count - 1) / (count - 2)) * largest, rel=2e-3)
 
 
-def autocorrelated(seed: int, count: int, correlation: float) -> tuple[Array, Array]:
-    """Return samples whose residuals are an AR(1) process of sd 0.1."""
-    random = np.random.default_rng(seed)
-    steps, noise = random.standard_normal(count + 60), np.zeros(count + 60)
-    for index in range(1, count + 60):
-        noise[index] = correlation * noise[index - 1] + sqrt(1.0 - correlation**2) * steps[index]
-    x = np.linspace(0.05, 1.0, count)
-    return x, K * x + 0.1 * noise[60:]
-
-
-def coverage(count: int, correlation: float, runs: int = 400) -> float:
-    """Return the fraction of strokes whose true coefficient lies within two standard errors."""
-    fits = [fitted(*autocorrelated(seed, count, correlation)) for seed in range(runs)]
-    return sum(abs(fit.slope - K) <= 2.0 * fit.std_error for fit in fits) / runs
-
-
 @pytest.mark.parametrize("count", [5, 8, 12, 20, 40])
 def test_two_standard_errors_cover_independent_noise_95_times_in_a_hundred_however_short_the_stroke(count: int) -> None:
     """The limits allow three sampling errors of 400 runs to either side, and up to 2 % more since the larger error is
     used.
     """
-    assert 0.92 <= coverage(count, 0.0) <= 0.985
+    fits = [fitted(*noisy(seed, count)) for seed in range(400)]
+    assert 0.92 <= np.mean([abs(fit.slope - K) <= 2.0 * fit.std_error for fit in fits]) <= 0.985
 
 
 def test_a_bend_from_the_law_makes_no_uncertainty() -> None:

@@ -60,14 +60,6 @@ def test_even_motion_leaves_batches_of_equal_travel_in_either_direction(directio
     assert np.diff(travels_m) == pytest.approx(direction * STEP_M, abs=1.01 * per_sample_m)
 
 
-def test_the_rate_of_messages_does_not_change_the_batches() -> None:
-    """A batch ends with the first sample that is a step away, late by less than the travel between two samples."""
-    often, seldom = (stroke_of(even(rate_hz)).batches for rate_hz in (38000.0, 380.0))
-    per_sample_m = SPEED_M_S / 380.0
-    assert len(often) * STEP_M / (STEP_M + per_sample_m) - 1 <= len(seldom) <= len(often)
-    assert np.diff([batch.travel_m for batch in seldom[:-1]]).max() <= STEP_M + per_sample_m
-
-
 def test_a_flipper_that_stands_still_adds_to_one_batch() -> None:
     rows = even(380.0, path_m=0.015)
     end_s, end_m = rows[-1]
