@@ -182,9 +182,6 @@ def test_torque_is_nothing_from_hot_on_and_whole_up_to_warm(
     assert limited_nm == pytest.approx(torque_nm, rel=0.01, abs=0.0)
 
 
-# defaults
-
-
 # not finite
 
 

@@ -118,14 +118,6 @@ def test_no_joint_accelerates_between_ticks_harder_than_its_torque_limit_allows_
         assert abs(adduction_change) / PERIOD_S * arm.adduction_inertia_kg_m2 < torque_nm
 
 
-def test_joints_stand_still_where_phases_meet() -> None:
-    gait = started(0.03)
-    for row in stride_table(WALKING, GEOMETRY, 0.03):
-        target = gait.step(row.duration_s)
-        assert target.sweep_velocity_rad_s == pytest.approx(0.0, abs=1e-9)
-        assert target.depth_velocity_m_s == pytest.approx(0.0, abs=1e-9)
-
-
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_a_hundred_strides_keep_their_exact_rate(depth_m: float) -> None:
     quick = GaitParameters(insertion_speed_m_s=1.0, swing_duration_s=0.1)
@@ -137,25 +129,6 @@ def test_a_hundred_strides_keep_their_exact_rate(depth_m: float) -> None:
     expected = started(depth_m, quick).step(ticks * PERIOD_S - 100 * duration)
     assert (target.stride, target.phase) == (100, expected.phase)
     assert target[2:] == pytest.approx(expected[2:], abs=1e-6)
-
-
-@given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
-def test_the_phase_depends_on_the_time_and_not_on_the_number_of_ticks(steps: list[float]) -> None:
-    gait = started(0.04)
-    for dt in steps:
-        stepped = gait.step(dt)
-    at_once = started(0.04).step(sum(steps))
-    duration = stride_duration_s(WALKING, GEOMETRY, 0.04)
-    assert stepped.stride + gait_fraction(stepped) == pytest.approx(at_once.stride + gait_fraction(at_once), abs=2e-4)
-    assert stepped.stride in (floor(sum(steps) / duration - 1e-9), floor(sum(steps) / duration + 1e-9))
-
-
-def gait_fraction(target: GaitTarget) -> float:
-    """Return a number from 0 to 1 that grows through the stride with the paths covered, each phase a quarter."""
-    sweep = (radians(30.0) - target.sweep_rad) / radians(60.0)
-    depth = (target.depth_m + 0.0145) / (0.04 + 0.0145)
-    within = {Phase.INSERTION: depth, Phase.STANCE: sweep, Phase.EXTRACTION: 1.0 - depth, Phase.SWING: 1.0 - sweep}
-    return (target.phase - 1 + within[target.phase]) / 4.0
 
 
 def test_a_new_depth_waits_for_the_next_stride() -> None:

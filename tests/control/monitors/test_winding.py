@@ -1,6 +1,6 @@
-"""The winding's temperature against the closed form, against scipy's integrator, and under the reading of a sensor."""
+"""The winding's temperature against scipy's integrator, and under the reading of a sensor."""
 
-from math import exp, inf, isfinite, nan, sin
+from math import inf, isfinite, nan, sin
 
 import numpy as np
 import pytest
@@ -23,28 +23,13 @@ def heated(current_a: float, ticks: int, dt_s: float = PERIOD_S, parameters: Win
     return winding
 
 
-def closed_form_c(current_a: float, time_s: float) -> float:
-    """Return the closed form: as R grows by 0.39 % per kelvin, the equation τ dT/dt = a - b T stays linear."""
-    p = PARAMETERS
-    watts_per_ohm = p.thermal_resistance_k_w * 1.5 * p.resistance_ohm * current_a**2
-    b = 1.0 - 0.0039 * watts_per_ohm
-    end_c = (p.room_c + watts_per_ohm * (1.0 - 0.0039 * 25.0)) / b
-    return end_c + (p.room_c - end_c) * exp(-b * time_s / p.time_constant_s)
-
-
 def test_it_begins_as_warm_as_the_room_and_stays_so_without_current() -> None:
     assert heated(0.0, 1000).temperature_c == PARAMETERS.room_c
 
 
-@pytest.mark.parametrize(("current_a", "time_s"), [(-2.0, 1.0), (5.0, 20.0), (9.0, 120.0)])
-def test_a_steady_current_heats_it_by_the_closed_form(current_a: float, time_s: float) -> None:
-    reported_c = heated(current_a, round(time_s / PERIOD_S)).temperature_c
-    assert reported_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
-
-
 def test_a_changing_current_heats_it_like_an_integrator() -> None:
     def current_a(time_s: float) -> float:
-        return 6.0 * sin(2.0 * time_s) + 2.0
+        return 10.0 * sin(2.0 * time_s) + 2.0
 
     def slope_k_s(time_s: float, temperature_c: np.ndarray) -> np.ndarray:
         watts = 1.5 * PARAMETERS.resistance_ohm * (1.0 + 0.0039 * (temperature_c - 25.0)) * current_a(time_s) ** 2
@@ -56,7 +41,7 @@ def test_a_changing_current_heats_it_like_an_integrator() -> None:
     for tick in range(round(60.0 / PERIOD_S)):
         winding.update(PERIOD_S, current_a((tick + 0.5) * PERIOD_S), nan)
     assert winding.temperature_c == pytest.approx(float(exact), abs=0.01)
-    assert exact > 40.0
+    assert exact > 60.0
 
 
 def test_a_sensor_that_reads_higher_is_trusted_and_one_that_reads_lower_is_not() -> None:
