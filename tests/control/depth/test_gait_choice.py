@@ -240,22 +240,13 @@ def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken_and_witho
     assert choice.depth_m == pytest.approx(0.05)
 
 
-@settings(max_examples=15)
-@given(k_s=st.floats(1e4, 1e7), k_e=st.floats(1e4, 1e7), seed=st.integers(0, 7))
-def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
-    adaptation = adapted()
-    for i in range(4):
-        choice = choose_now(adaptation, estimated(k_s, k_e), strides(released=bool(seed >> i & 1)))
-        assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
-        assert 30.0 <= sweep_deg(choice) <= 50.0
-
-
 def test_no_stride_that_may_be_chosen_asks_a_joint_for_more_than_its_velocity_limit() -> None:
     limit_rad_s = JointLimits().velocity_rad_s
     adaptation = adapted()
     finish(adaptation.prepare())
     assert len(adaptation.candidates) > 40
     for stride in adaptation.candidates:
+        assert 0.015 <= stride.depth_m <= min(0.05, GEOMETRY.deepest_m(stride.gait.sweep_angle_deg))
         gait = Gait(stride.gait, GEOMETRY)
         gait.reset(stride.depth_m)
         while (target := gait.step(0.002)).stride == 0:

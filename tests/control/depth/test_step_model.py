@@ -114,12 +114,6 @@ class TestAgainstFineSteps:
 
 
 class TestLimits:
-    @given(st.floats(0.01, 12.5), st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.floats(20.0, 5000.0))
-    def test_thrust_below_dry_drag_moves_nothing(
-        self, dry_n: float, fraction: float, damping_n_s_m: float, stiffness_n_m: float
-    ) -> None:
-        assert predicted_m(fraction * dry_n, stiffness_n_m, BodyDrag(dry_n, damping_n_s_m, 1.0)) == 0.0
-
     @given(st.floats(0.5, 8.0), st.floats(0.0, 20.0), st.tuples(*[st.floats(0.5, 12.5)] * 2), st.floats(200.0, 1000.0))
     def test_more_thrust_never_shortens_a_step_within_the_sweep(
         self, dry_n: float, damping_n_s_m: float, pair: tuple[float, float], stiffness_n_m: float
@@ -130,24 +124,9 @@ class TestLimits:
         assume(weak_m < 2.0 * LENGTH_M * sin(radians(WALKING.sweep_angle_deg)))
         assert strong_m >= weak_m
 
-    def test_firm_mud_and_stiff_traction_carry_the_body_as_far_as_the_arms_sweep(self) -> None:
-        """The spring yields by what drag and start take, m a + f_r + b v, and overshoots by no more."""
-        top_m_s, stiffness_n_m = top_speed_m_s(WALKING), 10000.0
-        acceleration_m_s2 = top_m_s * pi / (2.0 * RAMP_S)
-        give_m = (1.0 * acceleration_m_s2 + 2.5 + 6.0 * top_m_s) / stiffness_n_m
-        step = predicted_m(1e4, stiffness_n_m)
-        assert step == pytest.approx(2.0 * LENGTH_M * sin(radians(30.0)), abs=2.0 * give_m)
-
     def test_the_weaker_of_mud_and_motor_must_exceed_the_dry_drag(self) -> None:
         assert predicted_m(50.0, motor_n=2.5) == predicted_m(2.5, motor_n=50.0) == 0.0
         assert predicted_m(50.0, motor_n=2.6) > 0.0
-
-    def test_with_motors_at_their_limit_a_deeper_stride_in_firm_mud_is_longer(self) -> None:
-        """The arms make up for their lag until the mud lets go of the plates; mud that yields cuts the lag off."""
-        drag = RAIL._replace(dry_n=7.0)
-        lagging_m = [predicted_m(800.0 * z, 500.0, drag, z, motor_n=12.5) for z in np.arange(0.02, 0.05, 0.005)]
-        assert lagging_m == sorted(lagging_m) and lagging_m[-1] > 1.1 * lagging_m[0]
-        assert predicted_m(20.0, 500.0, drag, motor_n=12.5) > predicted_m(12.5, 500.0, drag)
 
 
 class TestCoast:
@@ -170,7 +149,7 @@ class TestCoast:
     def test_without_viscous_drag_it_is_the_kinetic_energy_over_friction(self) -> None:
         assert coast_m(BodyDrag(2.5, 0.0, 2.0), 0.6) == pytest.approx(2.0 * 0.6**2 / 2.0 / 2.5)
 
-    @pytest.mark.parametrize("damping_n_s_m", [1e-3, 1e-5, 1e-7, 1e-9, 5e-324])
+    @pytest.mark.parametrize("damping_n_s_m", [1e-3, 1e-9, 5e-324])
     def test_it_goes_over_into_dry_friction_alone(self, damping_n_s_m: float) -> None:
         """To first order it is shorter by the fraction 2 b v / 3 f_r; 1e-9 covers the rounding."""
         drag = BodyDrag(2.5, damping_n_s_m, 2.0)
