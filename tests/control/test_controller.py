@@ -17,7 +17,7 @@ from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
 from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S
-from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_each
+from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, same_for_each
 from tests.control.synthetic_states import NO_TORQUE, states_at
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -130,19 +130,6 @@ def test_the_gait_moves_both_flippers_alike_at_the_ordered_depth() -> None:
         assert GEOMETRY.depth_m(sweep, adduction) == pytest.approx(controller.target.depth_m, abs=1e-9)
         deepest = max(deepest, controller.target.depth_m)
     assert deepest == pytest.approx(0.04)
-
-
-def test_the_velocities_wanted_in_the_gait_are_those_of_the_angles() -> None:
-    def gait_only(gains: JointGains) -> list[Torques]:
-        controller = ordered(gains=gains)
-        while controller.target is RESTING:
-            controller.step(PERIOD_S, Mode.WALKING, states_at(FRONT))
-        return [controller.step(PERIOD_S / 20.0, Mode.WALKING, states_at(FRONT)) for _ in range(8000)]
-
-    angles, velocities = gait_only(SPRING), gait_only(DAMPER)
-    for before, now, after in zip(angles, velocities[1:], angles[2:], strict=False):
-        slopes = [(b - a) / (2.0 * PERIOD_S / 20.0) for a, b in zip(before, after, strict=True)]
-        assert now == pytest.approx(slopes, abs=0.01)
 
 
 def test_a_walk_is_finished_after_the_strides_that_were_ordered_and_without_a_number_never() -> None:
