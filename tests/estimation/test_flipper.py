@@ -341,24 +341,6 @@ def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
 # motors at their limit, bodies that move
 
 
-def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
-    """Let the body advance by a fraction of the flipper's travel in stance; the rest is slip."""
-    front_m, lifted = LENGTH_M * sin(radians(30.0)), (Phase.SWING, Phase.INSERTION)
-    paths_m = [0.0 if row.phase in lifted else front_m - LENGTH_M * sin(row.sweep.angle_rad) for row in rows]
-    return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, paths_m, strict=True)]
-
-
-@pytest.mark.parametrize(
-    ("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "limited_by_body"), (nan, "unknown")]
-)
-def test_the_body_position_shows_whether_mud_or_body_moved(fraction: float, case: str) -> None:
-    stride = one(carried(rows_of(motion()), fraction), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
-    assert stride.stance == case
-    assert stride.k_s.at_least is (case in ("limited_by_body", "unknown"))
-    assert stride.k_s.value == pytest.approx(MUD.k_s, rel=2e-3)  # these rows carry the mud's whole strength anyway
-    assert isfinite(stride.step_m) is isfinite(stride.position_m) is isfinite(fraction)
-
-
 def test_step_and_position_are_the_bodys() -> None:
     """The step is the advance from close to close; the position is where the insertion ended."""
     rows = [row._replace(body_m=7.0 + 0.05 * row.now_s) for row in rows_of(motion(strides=3))]

@@ -4,7 +4,7 @@ from math import exp, inf, log, nan, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from control.records import Estimate, StrideEstimate
@@ -96,18 +96,3 @@ def test_a_long_walk_drops_the_pieces_that_were_visited_longest_ago() -> None:
         mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
     pieces = [round(row.position_m / PIECE_M - 0.5) for row in mud_map.rows()]
     assert pieces == [0, *range(4, MOST_PIECES + 3)]
-
-
-numbers = st.floats() | st.floats(1e4, 1e8)
-anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), st.just(""), st.booleans())
-
-
-@example([(0.0, Estimate(1e6, 1e162, 10, True, repeatability=1e5), 0.03)])  # its square overflows
-@given(st.lists(st.tuples(st.floats(), anything, st.floats() | st.floats(0.01, 0.06)), max_size=20))
-def test_for_any_input_the_map_contains_positive_numbers(walk: list[tuple[float, Estimate, float]]) -> None:
-    mud_map = MudMap()
-    for position_m, estimate, depth_m in walk:
-        mud_map.update(position_m, [stride(estimate, estimate, estimate, depth_m)])
-    for row in mud_map.rows():
-        assert row.k_s is not None
-        assert all(0.0 < number < inf for number in row.k_s[:4])
