@@ -43,8 +43,8 @@ def heavy(motion: MotionParameters = MotionParameters()) -> Controller:  # noqa:
     return Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), motion, recovery())
 
 
-def ordered(order: WalkOrder = WalkOrder(0.03), gains: JointGains = SPRING) -> Controller:  # noqa: B008 - immutable
-    controller = weightless(gains)
+def ordered(order: WalkOrder = WalkOrder(0.03)) -> Controller:  # noqa: B008 - immutable
+    controller = weightless()
     controller.order = order
     return controller
 
@@ -173,28 +173,23 @@ def raise_flippers(controller: Controller) -> list[JointAngles]:
 
 
 def test_stopping_raises_the_flippers_where_they_are_and_hold_keeps_them_there() -> None:
-    controller = walking()
-    poses = raise_flippers(controller)
-    assert poses[0] == pytest.approx(POSE, abs=1e-3)
-    assert all((pose[0], pose[2]) == pytest.approx((POSE[0], POSE[2])) for pose in poses)
-    assert wanted_pose(controller, Mode.STOPPING, RAISED) == pytest.approx(RAISED)
-    for _ in range(2):
-        assert wanted_pose(controller, Mode.HOLD, Joints(0.1, -0.1, 0.1, -0.1)) == pytest.approx(RAISED)
-    assert not controller.raised  # it is reported only while stopping
+    on_the_path_to_the_front = ordered()
+    for _ in range(20):
+        wanted_pose(on_the_path_to_the_front, Mode.WALKING)
+    for controller in (walking(), on_the_path_to_the_front):
+        poses = raise_flippers(controller)
+        assert poses[0] == pytest.approx(POSE, abs=1e-3)
+        assert all((pose[0], pose[2]) == pytest.approx((POSE[0], POSE[2])) for pose in poses)
+        assert wanted_pose(controller, Mode.STOPPING, RAISED) == pytest.approx(RAISED)
+        for _ in range(2):
+            assert wanted_pose(controller, Mode.HOLD, Joints(0.1, -0.1, 0.1, -0.1)) == pytest.approx(RAISED)
+        assert not controller.raised  # it is reported only while stopping
 
 
 def test_flippers_that_the_mud_keeps_down_are_held_where_they_are_after_a_stop() -> None:
     controller = walking()
     raise_flippers(controller)
     assert controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) == pytest.approx(NO_TORQUE)
-
-
-def test_a_stop_on_the_path_to_the_front_raises_the_flippers_too() -> None:
-    controller = ordered()
-    for _ in range(20):
-        wanted_pose(controller, Mode.WALKING)
-    raise_flippers(controller)
-    assert wanted_pose(controller, Mode.STOPPING) == pytest.approx(RAISED)
 
 
 def turning_at(velocities: tuple[float, ...], for_s: float = 0.0) -> DriveStates:

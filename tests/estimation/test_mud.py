@@ -27,10 +27,10 @@ from tests.estimation.synthetic_strides import update as update_one
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
 
 
-def walk(seed: int, strides: int = STRIDES) -> list[Row]:
+def walk(seed: int) -> list[Row]:
     """Return a walk whose last row, with which a swing begins, closes the last stride."""
     once = stride_samples(seed)
-    return [row.later(PERIOD_OF_STRIDE_S * stride) for stride in range(strides) for row in once]
+    return [row.later(PERIOD_OF_STRIDE_S * stride) for stride in range(STRIDES) for row in once]
 
 
 def estimator(method: Method = "default") -> MudEstimator:

@@ -7,18 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.records import Estimate, StrideEstimate
+from control.records import StrideEstimate
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
 from estimation.strokes.depth_line import REPEATABILITY
-from tests.control import synthetic_muds
-from tests.control.synthetic_muds import NOT_REPORTED
 from tests.control.synthetic_muds import measured as reported
-
-
-def stride(
-    k_p: Estimate = NOT_REPORTED, k_s: Estimate = NOT_REPORTED, k_e: Estimate = NOT_REPORTED, depth_m: float = 0.03
-) -> StrideEstimate:
-    return synthetic_muds.stride("left", depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
+from tests.control.synthetic_muds import stride
 
 
 def mapped(*strides: StrideEstimate, position_m: float = 0.01) -> MudMap:

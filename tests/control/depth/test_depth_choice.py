@@ -13,6 +13,7 @@ from control.computing.bounded_work import finish
 from control.depth.depth_choice import DepthAdaptation, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, carried_m, motion_of
+from control.gait.stride_table import stride_duration_s
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
@@ -47,12 +48,6 @@ def chosen(
     adaptation = adapted()
     adaptation.reset(commanded_m)
     return choose_now(adaptation, mud_estimate, both() if strides is None else strides)
-
-
-def duration_s(depth_m: float) -> float:
-    """Return the time down and up from 1.45 cm above the mud, in the stance's arc of 2 α l, and in 0.8 s of swing."""
-    travel_m = 0.0145 + depth_m
-    return travel_m / 0.1 + 2.0 * radians(30.0) * 0.12 / 0.5 + travel_m / 0.5 + 0.8
 
 
 def predicted_m(thrust_n: float, k_s: float, depth_m: float) -> float:
@@ -93,7 +88,7 @@ class TestTheFastestDepth:
         mud_estimate = estimated(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
         known, choice = forecast(mud_estimate, strides), chosen(mud_estimate, strides)
         steps = {round(z, 6): step for z, step in steps_m(known).items()}
-        out = {z: steps[z] / duration_s(z) for z in steps if known.extraction_nm(z) < ALLOWED_NM}
+        out = {z: steps[z] / stride_duration_s(GAIT, GEOMETRY, z) for z in steps if known.extraction_nm(z) < ALLOWED_NM}
         taken_m = round(choice.depth_m, 6)
         assert choice.slips == (steps[taken_m] < 0.06) or abs(steps[taken_m] - 0.06) < 1e-9
         assume(out and max(out.values()) > 0.0)

@@ -14,7 +14,7 @@ from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptati
 from control.depth.step_model import Traction, carried_m, motion_of
 from control.gait.gait import Gait
 from control.gait.stride_table import stride_duration_s
-from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
+from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
@@ -26,14 +26,12 @@ from tests.control.synthetic_muds import GAIT, GEOMETRY, LIFTING_NM, both, choos
 PARAMETERS = AdaptationParameters(method="gait")
 
 
-def reported(value: float, at_least: bool = False) -> Coefficient:
-    return synthetic_muds.reported(value, 0.05 * value, exponent_uncertainty=0.1)._replace(at_least=at_least)
+def reported(value: float) -> Coefficient:
+    return synthetic_muds.reported(value, 0.05 * value, exponent_uncertainty=0.1)
 
 
-def estimated(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
-    """Return the same estimate for both flippers."""
-    flipper = FlipperEstimate(None, reported(k_s), reported(k_e))
-    return MudEstimate(None, reported(k_s), reported(k_e), flipper, flipper, boundary)
+def estimated(k_s: float, k_e: float) -> MudEstimate:
+    return synthetic_muds.estimated(reported(k_s), reported(k_e))
 
 
 FIRM, SOFT = estimated(2.0e6, 0.5e6), estimated(0.2e6, 0.1e6)
@@ -45,8 +43,8 @@ def strides(
     return both(depth_m, released, surface_m, torque_nm)
 
 
-def adapted(parameters: AdaptationParameters = PARAMETERS) -> GaitAdaptation:
-    return GaitAdaptation(parameters, GEOMETRY, GAIT)
+def adapted() -> GaitAdaptation:
+    return GaitAdaptation(PARAMETERS, GEOMETRY, GAIT)
 
 
 def sweep_deg(choice: DepthChoice) -> float:
@@ -54,9 +52,9 @@ def sweep_deg(choice: DepthChoice) -> float:
     return choice.gait.sweep_angle_deg
 
 
-def settled(mud_estimate: MudEstimate, count: int = 5) -> DepthChoice:
+def settled(mud_estimate: MudEstimate) -> DepthChoice:
     adaptation = adapted()
-    for _ in range(count):
+    for _ in range(5):
         choice = choose_now(adaptation, mud_estimate, strides())
     return choice
 
@@ -124,8 +122,7 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
         narrowed = replace(parameters, gait=GaitAdaptationParameters(deg, deg))
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
         k_e = synthetic_muds.reported(fraction * just, 0.05 * fraction * just, depth_m=0.02)
-        flipper = FlipperEstimate(None, reported(2e6), k_e)
-        choice = choose_now(adaptation, MudEstimate(None, reported(2e6), k_e, flipper, flipper), strides(depth_m=nan))
+        choice = choose_now(adaptation, synthetic_muds.estimated(reported(2e6), k_e), strides(depth_m=nan))
         assert (choice.reason == "fastest") is comes_out
 
 

@@ -30,15 +30,15 @@ def started(depth_m: float = 0.03, parameters: GaitParameters = WALKING) -> Gait
     return gait
 
 
-def targets(dt_s: float, depth_m: float, parameters: GaitParameters = WALKING) -> Iterator[GaitTarget]:
-    gait = started(depth_m, parameters)
+def targets(depth_m: float) -> Iterator[GaitTarget]:
+    gait = started(depth_m)
     while True:
-        yield gait.step(dt_s)
+        yield gait.step(PERIOD_S)
 
 
-def one_stride(dt_s: float, depth_m: float, parameters: GaitParameters = WALKING) -> list[GaitTarget]:
-    count = floor(stride_duration_s(parameters, GEOMETRY, depth_m) / dt_s - 1e-6)
-    return list(islice(targets(dt_s, depth_m, parameters), count))
+def one_stride(depth_m: float) -> list[GaitTarget]:
+    count = floor(stride_duration_s(WALKING, GEOMETRY, depth_m) / PERIOD_S - 1e-6)
+    return list(islice(targets(depth_m), count))
 
 
 def adduction_velocity_rad_s(target: GaitTarget) -> float:
@@ -74,7 +74,7 @@ def test_each_phase_lasts_its_path_over_its_speed_and_a_swing_its_duration(durat
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_the_stance_sweeps_at_its_depth_from_plus_to_minus_thirty_degrees(depth_m: float) -> None:
-    stance = [target for target in one_stride(PERIOD_S, depth_m) if target.phase is Phase.STANCE]
+    stance = [target for target in one_stride(depth_m) if target.phase is Phase.STANCE]
     assert {target.depth_m for target in stance} == {depth_m}
     assert {target.depth_velocity_m_s for target in stance} == {0.0}
     assert all(later.sweep_rad < earlier.sweep_rad for earlier, later in pairwise(stance))
@@ -83,7 +83,7 @@ def test_the_stance_sweeps_at_its_depth_from_plus_to_minus_thirty_degrees(depth_
 
 
 def test_the_edge_swings_back_above_the_mud() -> None:
-    swing = [target for target in one_stride(PERIOD_S, 0.05) if target.phase is Phase.SWING]
+    swing = [target for target in one_stride(0.05) if target.phase is Phase.SWING]
     assert [target.depth_m for target in swing] == pytest.approx([-0.0145] * len(swing))
     assert all(target.sweep_velocity_rad_s > 0.0 for target in swing[1:-1])
     row = stride_table(WALKING, GEOMETRY, 0.03)[-1]
@@ -109,7 +109,7 @@ def test_smooth_progress_moves_at_the_rate_that_it_returns(duration: float, frac
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
 def test_no_joint_accelerates_between_ticks_harder_than_its_torque_limit_allows_in_air(depth_m: float) -> None:
-    stride = list(islice(targets(PERIOD_S, depth_m), 2000))
+    stride = list(islice(targets(depth_m), 2000))
     arm, torque_nm = ArmMass(), JointLimits().torque_nm
     for now, after in pairwise(stride):
         sweep_change = after.sweep_velocity_rad_s - now.sweep_velocity_rad_s
@@ -178,11 +178,11 @@ WIDE = replace(WALKING, sweep_angle_deg=45.0, swing_duration_s=0.3)
 NARROW = replace(WALKING, sweep_angle_deg=20.0)
 
 
-def swept(changes: dict[float, GaitParameters], duration_s: float, dt_s: float = 0.0005) -> list[GaitTarget]:
+def swept(changes: dict[float, GaitParameters], duration_s: float) -> list[GaitTarget]:
     """Return the targets of a walk whose next gait is set at the first tick at or after each given fraction of the
     swing.
     """
-    gait, seen, waiting, swing_ticks = started(), list[GaitTarget](), dict(changes), 0
+    gait, seen, waiting, swing_ticks, dt_s = started(), list[GaitTarget](), dict(changes), 0, 0.0005
     for _ in range(round(duration_s / dt_s)):
         if seen and seen[-1].phase is Phase.SWING and seen[-1].stride == 0:
             swing_ticks += 1

@@ -16,8 +16,8 @@ from control.rate import PERIOD_S
 PARAMETERS = WindingParameters()
 
 
-def heated(current_a: float, ticks: int, dt_s: float = PERIOD_S, parameters: WindingParameters = PARAMETERS) -> Winding:
-    winding = Winding(parameters)
+def heated(current_a: float, ticks: int, dt_s: float = PERIOD_S) -> Winding:
+    winding = Winding(PARAMETERS)
     for _ in range(ticks):
         winding.update(dt_s, current_a, nan)
     return winding

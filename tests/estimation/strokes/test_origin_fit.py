@@ -23,10 +23,10 @@ def fitted(x: Array, y: Array) -> OriginFit:
     return fit
 
 
-def noisy(seed: int, count: int, noise: float = 0.1) -> tuple[Array, Array]:
+def noisy(seed: int, count: int) -> tuple[Array, Array]:
     random = np.random.default_rng(seed)
     x = np.sort(random.uniform(0.05, 1.0, count))
-    return x, K * x + noise * random.standard_normal(count)
+    return x, K * x + 0.1 * random.standard_normal(count)
 
 
 def with_outliers(seed: int, count: int) -> tuple[Array, Array]:

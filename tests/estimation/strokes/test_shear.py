@@ -59,12 +59,12 @@ def pressed(batches: Sequence[Batch], k_s: float = K_S, surface_m: float = 0.0) 
     return [batch._replace(sweep_nm=k_s * moment_m4(batch, surface_m)) for batch in batches]
 
 
-def sheared(batches: Sequence[Batch], k_s: float = K_S, base: Base = Base.FREE) -> list[Batch]:
+def sheared(batches: Sequence[Batch], base: Base = Base.FREE) -> list[Batch]:
     """Load the batches with a strength that grows with the slip, up to the full strength at MOBILISED_M."""
     path_m, loaded = 0.0, []
     for batch, slip_m in zip(batches, [0.0, *(slips_m(GEOMETRY, batches, base) or ())], strict=True):
         path_m += slip_m
-        loaded.append(batch._replace(sweep_nm=min(path_m / MOBILISED_M, 1.0) * k_s * moment_m4(batch)))
+        loaded.append(batch._replace(sweep_nm=min(path_m / MOBILISED_M, 1.0) * K_S * moment_m4(batch)))
     return loaded
 
 

@@ -24,13 +24,13 @@ def row(
     return now_s, travel_m, 2.0 * travel_m, 3.0 * travel_m, 4.0 * travel_m, 5.0 * travel_m, body_m, saturated
 
 
-def even(rate_hz: float, path_m: float = 0.045, speed_m_s: float = SPEED_M_S, start_m: float = -0.0145) -> list[Row]:
-    count = round(path_m / speed_m_s * rate_hz)
-    return [(i / rate_hz, start_m + speed_m_s * i / rate_hz) for i in range(count)]
+def even(rate_hz: float, path_m: float = 0.045, start_m: float = -0.0145) -> list[Row]:
+    count = round(path_m / SPEED_M_S * rate_hz)
+    return [(i / rate_hz, start_m + SPEED_M_S * i / rate_hz) for i in range(count)]
 
 
-def stroke_of(rows: Iterable[Row], step_m: float = STEP_M) -> Stroke:
-    stroke, now_s, travel_m = Stroke(step_m), 0.0, 0.0
+def stroke_of(rows: Iterable[Row]) -> Stroke:
+    stroke, now_s, travel_m = Stroke(STEP_M), 0.0, 0.0
     for now_s, travel_m in rows:
         stroke.update(*row(now_s, travel_m))
     stroke.close(now_s, travel_m)

@@ -63,9 +63,9 @@ CONSTANT = TORQUE_CONSTANT_UNCERTAINTY
 STROKE = FittedStroke(samples=7, depth_m=0.03, speed_m_s=0.1)
 
 
-def batch_at(travel_m: float, sweep_rad: float = FRONT_RAD, samples: int = SAMPLES) -> Batch:
+def batch_at(travel_m: float, sweep_rad: float = FRONT_RAD) -> Batch:
     adduction_rad = GEOMETRY.adduction_rad(sweep_rad, travel_m)
-    return Batch(travel_m, sweep_rad, adduction_rad, 0.0, 0.0, 0.0, False, samples, 0.1)
+    return Batch(travel_m, sweep_rad, adduction_rad, 0.0, 0.0, 0.0, False, SAMPLES, 0.1)
 
 
 def loaded(batch: Batch, k: float, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0) -> Batch:
@@ -76,22 +76,18 @@ def loaded(batch: Batch, k: float, surface_m: float = 0.0, law: Law = as_the_law
     return batch._replace(sweep_nm=face_nm, adduction_nm=k * moment_m4 + across_nm)
 
 
-def depths(start_m: float = -0.012, end_m: float = 0.03, step_m: float = STEP_M) -> list[float]:
-    count = round((end_m - start_m) / step_m)
-    return [start_m + step_m * (i + 0.5) for i in range(count)]
+def depths(end_m: float = 0.03, step_m: float = STEP_M) -> list[float]:
+    start_m = -0.012
+    return [start_m + step_m * (i + 0.5) for i in range(round((end_m - start_m) / step_m))]
 
 
-def down(
-    k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0, sweep_rad: float = FRONT_RAD
-) -> list[Batch]:
-    return [loaded(batch_at(travel_m, sweep_rad), k, surface_m, law, face_nm) for travel_m in depths()]
+def down(k: float = K, surface_m: float = 0.0, face_nm: float = 0.0) -> list[Batch]:
+    return [loaded(batch_at(travel_m), k, surface_m, face_nm=face_nm) for travel_m in depths()]
 
 
-def up(
-    k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0, sweep_rad: float = -FRONT_RAD
-) -> list[Batch]:
+def up(k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0) -> list[Batch]:
     rising_m = reversed(depths(step_m=0.002))
-    return [loaded(batch_at(travel_m, sweep_rad), -k, surface_m, law, face_nm) for travel_m in rising_m]
+    return [loaded(batch_at(travel_m, -FRONT_RAD), -k, surface_m, law, face_nm) for travel_m in rising_m]
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 ABOVE_M, BELOW_M = 0.0145, 0.03  # of an insertion: clearance and depth
 REFERENCE_NOISE_N, REFERENCE_COUNT = 0.096, 64  # they reproduce the table of section 4, below the surface
 BATCH_NOISE_N, BATCH_COUNT = 0.05, 20
+RUNS = 200
 
 
 def depths(seed: int, count: int = BATCH_COUNT) -> Array:
@@ -48,21 +49,21 @@ class Scores(NamedTuple):
 
 
 @cache
-def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 200) -> Scores:
+def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int) -> Scores:
     """Return the errors over many insertions into mud whose force is a jump plus a slope."""
     errors_mm, reported_mm, covered, of_k = [], 0.0, 0, []
-    for seed in range(runs):
+    for seed in range(RUNS):
         z = depths(seed, count)
         force = np.where(z > 0.0, jump_n + slope_n_m * z, 0.0) + noise_n * noise(seed, len(z))
         surface = found(z, force)
         assert surface.found
         errors_mm.append(1000.0 * surface.depth_m)
-        reported_mm += 1000.0 * surface.std_error_m / runs
+        reported_mm += 1000.0 * surface.std_error_m / RUNS
         covered += abs(surface.depth_m) <= 2.0 * surface.std_error_m
         below = z > surface.depth_m
         fit = fit_through_origin((z[below] - surface.depth_m).tolist(), (force[below] - surface.level_n).tolist())
         of_k.append(fit.slope / slope_n_m - 1.0 if fit else nan)
-    return Scores(np.array(errors_mm), reported_mm, covered / runs, np.array(of_k))
+    return Scores(np.array(errors_mm), reported_mm, covered / RUNS, np.array(of_k))
 
 
 # mud whose force rises from nothing

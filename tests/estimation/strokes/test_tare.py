@@ -24,9 +24,9 @@ def hang(tare: Tare, poses: list[tuple[float, float]], weight_n: float, noise_nm
         tare.update(jacobian.z_adduction, adduction_nm)
 
 
-def swing(count: int = 100) -> list[tuple[float, float]]:
+def swing() -> list[tuple[float, float]]:
     """Return the poses of a swing forward through the air, from -30 to +30 degrees."""
-    return [(pi / 6.0 * sin(pi * (i / count - 0.5)), 0.2 * cos(pi * i / count)) for i in range(count)]
+    return [(pi / 6.0 * sin(pi * (i / 100 - 0.5)), 0.2 * cos(pi * i / 100)) for i in range(100)]
 
 
 def again(tare: Tare, poses: list[tuple[float, float]], weight_n: float, is_air: bool = True) -> Tare:
