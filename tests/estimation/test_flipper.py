@@ -104,10 +104,8 @@ def noisy(rows: Sequence[Row], seed: int, noise_a: float = NOISE_A) -> list[Row]
     return synthetic_strides.noisy(rows, seed, noise_a)
 
 
-def estimator(
-    drive: FlipperDrive = WEIGHTLESS, surface_error_m: float = 0.001, base: Base = Base.FIXED
-) -> FlipperEstimator:
-    return FlipperEstimator("left", GEOMETRY, drive, base, 2.5, surface_error_m)
+def estimator(drive: FlipperDrive = WEIGHTLESS, surface_error_m: float = 0.001) -> FlipperEstimator:
+    return FlipperEstimator("left", GEOMETRY, drive, Base.FIXED, 2.5, surface_error_m)
 
 
 def waiting(rows: Sequence[Row]) -> list[Row]:

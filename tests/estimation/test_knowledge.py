@@ -8,7 +8,7 @@ import pickle
 from collections.abc import Sequence
 from functools import cache, partial
 from math import exp, inf, isfinite, isnan, log, nan, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -57,6 +57,10 @@ def walked(knowledge: MudKnowledge, *strides: StrideEstimate) -> MudEstimate:
     for each in strides:
         mud_estimate = knowledge.update([each])
     return mud_estimate
+
+
+def stride_with(**estimates: Any) -> StrideEstimate:
+    return stride(**estimates)
 
 
 def found(coefficient: Coefficient | None) -> Coefficient:
@@ -112,7 +116,7 @@ class TestOneMud:
     @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
     @given(st.lists(st.tuples(st.floats(0.95, 1.05), st.floats(0.0, 0.3)), min_size=1, max_size=8))
     def test_strides_are_merged_by_their_precision(self, name: str, rows: list[tuple[float, float]]) -> None:
-        mud_estimate = after(*(stride(**{name: reported(1e6 * value, relative)}) for value, relative in rows))
+        mud_estimate = after(*(stride_with(**{name: reported(1e6 * value, relative)}) for value, relative in rows))
         weights = [1.0 / (relative**2 + REPEATABILITY**2) for _, relative in rows]
         mean = float(np.average([log(value) for value, _ in rows], weights=weights))
         merged = found(getattr(mud_estimate, name))
@@ -279,7 +283,7 @@ class TestBoundaries:
         known = {"k_p": reported(K_P), "k_s": reported(K_S), "k_e": reported(K_E)}
         new = known | {changed: reported(2.0 * known[changed].value), also: reported(1.05 * known[also].value)}
         first, second, silent = (
-            after(*[ALL_KNOWN] * 8, *(stride(**estimates) for estimates in strides))
+            after(*[ALL_KNOWN] * 8, *(stride_with(**estimates) for estimates in strides))
             for strides in ([new], [new, new], [new | {also: NOT_REPORTED}])
         )
         assert (found(getattr(first, also)).strides, first.boundary) == (1, True)

@@ -7,6 +7,7 @@ tests; here each flipper must give what it would give alone.
 from collections.abc import Sequence
 from itertools import pairwise
 from math import inf, nan
+from typing import Any
 
 import pytest
 
@@ -128,7 +129,7 @@ def test_the_paper_adds_the_drag_only_if_configured() -> None:
     ],
 )
 def test_the_default_gets_base_drag_surface_error_and_what_lifts_a_free_body(
-    configured: dict[str, bool], mass_kg: float, base: Base, lift_n: float
+    configured: dict[str, Any], mass_kg: float, base: Base, lift_n: float
 ) -> None:
     parameters = EstimationParameters(surface_error_m=0.004, **configured)
     mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0, body_mass_kg=mass_kg)
