@@ -31,6 +31,7 @@ WRONG_COMMAND_LINES = [  # and what the message names
     ("upgrade --check", "FILE"),
     ("simulate --world world.toml --mud 48.5", "--mud"),
     ("simulate --mud 48", "48.5"),
+    ("simulate --local", "--config FILE"),
     ("simulate --reset --emergency-stop", "--emergency-stop: not allowed with argument --reset"),
     ("simulate --reset --mud 48.5", "--mud: not allowed with argument --reset"),
     ("simulate --bus a/b", "a/b"),
@@ -193,6 +194,7 @@ WRONG_CONFIGURATIONS += [
     )
 ]
 WRONG_CONFIGURATIONS += [
+    *((f"{command} --world world.toml", "segment 1.strength_pa = -1") for command in ("simulate", "demo")),
     ("init - --set drop_m=0.07", "geometry.axis_height_m"),
     ("init - --set drop_m=0.6", "geometry.drop_m = 0.6: must be at most 0.5"),
     ("init - --node left_sweep=1 --node right_sweep=1", "has the same on bus"),
@@ -239,6 +241,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "interface.toml": text.replace('"mudskipper_local"', '"sockercan"'),
         "broken.toml": "[limits]\ntorque_nm 0.8\n",
         "type.toml": text.replace("node_id = 0", 'node_id = 0\ntype = "odriv"'),
+        "world.toml": "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = -1\n",
     }
     for name, content in {"robot.toml": text, "text.mcap": "no log\n", **wrong}.items():
         (folder / name).write_text(content, encoding="utf-8")
@@ -253,10 +256,10 @@ def test_a_wrong_input_is_refused_with_its_status_and_its_name(
     monkeypatch.setattr("command_line.demo.demo.ENDING_SIGNALS", ())
     monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
     before = set(inputs.iterdir())
-    ended = run(*line.split(), MUDSKIPPER_SOCKET="/none.sock")
+    ended = run(*line.split(), MUDSKIPPER_SOCKET="/none.sock", XDG_RUNTIME_DIR=str(inputs))
     said = ended.stdout + ended.stderr
     assert ended.returncode == status, said
     assert named in " ".join(said.split()) and "Traceback" not in said
     assert (TORQUE_UNKNOWN in said) == (line in ("stop", "disarm"))
-    if status == exit_codes.USAGE:
+    if status in (exit_codes.USAGE, exit_codes.CONFIGURATION):  # before anything is made
         assert (ended.stdout == "" or "--json" in line) and set(inputs.iterdir()) == before
