@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.main import main
 from experiments.actuator.configuration_change import apply_changes, find_target, fitted_changes
 from experiments.actuator.fit import JointFit, fit_joint
 from experiments.actuator.friction import QUICK, SLOW
@@ -24,86 +23,60 @@ from firmware_host.configuration.loading import load_configuration
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
+from tests.command_line.command_lines import failure, json_of, run
 from tests.command_line.experiments.test_conduct import typed
 from tests.experiments.actuator.test_fit import make_entries
 
 pytestmark = pytest.mark.usefixtures("png_alone")
 
-SHORT = (
-    "experiment",
-    "actuator",
-    "--simulated",
-    "--joint",
-    "right_sweep",
-    "--weights",
-    "50,100,200,400,600",
-    "--trials",
-    "1",
-)
+ACTUATOR = ("experiment", "actuator", "--trials", "1")
+SIMULATED = (*ACTUATOR, "--simulated", "--joint", "right_sweep")
 
 
-def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*SHORT, "--out", str(tmp_path), "--apply", "--json"]) == exit_codes.OK
-    said = capsys.readouterr()
-    report = json.loads(said.out)
+def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(tmp_path: Path) -> None:
+    command = (*SIMULATED, "--weights", "50,100,200,400,600", "--out", str(tmp_path))
+    ended = run(*command, "--apply", "--json")
+    assert ended.returncode == exit_codes.OK and "+torque_constant_nm_a" in ended.stderr
+    report = json.loads(ended.stdout)
     (joint,) = report["joints"]
     assert joint["torque_constant_nm_a"] == pytest.approx(TRUE_CONSTANT_NM_A, rel=0.02)
+    assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
     assert joint["rmse_fitted_nm"] < joint["paper_rmse_nm"] < joint["rmse_configured_nm"]
+    assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
     assert not report["left_out"] and not report["not_fitted"]
     written = load_configuration(tmp_path / "mudskipper.toml")
     assert written.drive["right_sweep"].torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)
     assert written.friction["right_sweep"].coulomb_nm > 0.0
-    assert "+torque_constant_nm_a" in said.err
     assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "friction.png"}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Actuator calibration (simulated)" in page and "true k_t (N·m/A)</th>" in page
-    assert "What to set where" in page and "data:image/png;base64" in page
+    assert "true k_t (N·m/A)</th>" in page and "data:image/png;base64" in page
 
-    assert joint["torque_constant_error_nm_a"] > joint["torque_constant_tolerance_nm_a"] > 0.0
-    assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
-
-    coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
-    assert main(coarse) == exit_codes.OK  # all readings exist, so only the fit runs again
-    assert "right_sweep" in capsys.readouterr().out
-    (uncertain,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
+    # all readings exist, so only the fit runs again
+    (uncertain,) = json_of(*command, "--lever-tolerance", "10")["joints"]
     assert uncertain["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
     assert uncertain["friction_error_nm"] > joint["friction_error_nm"]
-    assert main([*SHORT, "--out", str(tmp_path), "--lever", "10"]) == exit_codes.REFUSED
-    assert "lever_m = 0.12" in capsys.readouterr().err
+    assert "lever_m = 0.12" in failure(*command, "--lever", "10", status=exit_codes.REFUSED)
 
 
-def test_weights_that_the_robot_cannot_hold_are_refused_before_anything_moves(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = [*SHORT[:5], "--weights", "100,1500", "--out", str(tmp_path)]
-    assert main(command) == exit_codes.REFUSED
-    assert "limits.torque_nm = 1.4: must be at least" in capsys.readouterr().err
+def test_weights_that_the_robot_cannot_hold_are_refused_before_anything_moves(tmp_path: Path) -> None:
+    ended = run(*SIMULATED, "--weights", "100,1500", "--out", str(tmp_path))
+    assert ended.returncode == exit_codes.REFUSED and "limits.torque_nm = 1.4: must be at least" in ended.stderr
 
 
 def test_an_operator_at_a_terminal_is_prompted_and_may_skip_weights(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The robot is simulated in lockstep and no weight is ever hung on it, so only the empty arm is read."""
     configuration = simulated_configuration()
     recorder = FileRecorder(tmp_path / "robot.mcap", configuration)
     robot = LockstepRobot(Lockstep(configuration, paper_track(), 1, recorder), recorder)
     monkeypatch.setattr(actuator, "DaemonRobot", lambda socket: robot)
-    command = ["experiment", "actuator", "--joint", "right_adduction", "--weights", "10,20", "--trials", "1"]
+    command = (*ACTUATOR, "--joint", "right_adduction", "--weights", "10,20")
     with typed(monkeypatch, "\n\n\ns\ns\ns\n\n"):
-        assert main([*command, "--out", str(tmp_path)]) == exit_codes.OK
-    questions = capsys.readouterr().err.split("[Enter")
-    expected = (
-        "Mount the robot",
-        "Let go",
-        "take everything off",
-        "hang 10 g at 12 cm",
-        "hang 20 g",
-        "everything",
-        "off",
-        "",
-    )
+        ended = run(*command, "--out", str(tmp_path))
+    assert ended.returncode == exit_codes.OK
+    weights = ("take everything off", "hang 10 g at 12 cm", "hang 20 g", "everything", "off")
+    expected, questions = ("Mount the robot", "Let go", *weights, ""), ended.stderr.split("[Enter")
     assert all(part in question for part, question in zip(expected, questions, strict=True))
     entries = Notebook(tmp_path / "right_adduction", read_plan(tmp_path / "right_adduction")).entries
     assert entries["trial 1, 10 g"] == {"skipped": "on request"}
