@@ -8,10 +8,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.logs import catalogue_commands
-from command_line.main import main
 from firmware_host.log.log_folder import DONE
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
-from tests.command_line.command_lines import failure, json_of, output
+from tests.command_line.command_lines import failure, json_of, output, run
 from tests.folders import ROOT
 
 
@@ -46,10 +45,10 @@ def test_columns_of_one_name_are_all_answered(folder: Path) -> None:
     assert json_of("log", "query", "select 1 as a, 2 as a, 3 as b", str(folder))["rows"] == [{"a": 1, "a_1": 2, "b": 3}]
 
 
-def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path) -> None:
     path = catalogue_path(folder)
     duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
     assert "update mudskipper" in failure("log", "query", "select 1", str(folder))
-    assert main(["log", "list", str(folder)]) == exit_codes.OK
-    printed = capsys.readouterr()
-    assert "walk.mcap" in printed.out and "update mudskipper" in printed.err
+    listed = run("log", "list", str(folder))
+    assert listed.returncode == exit_codes.OK
+    assert "walk.mcap" in listed.stdout and "update mudskipper" in listed.stderr

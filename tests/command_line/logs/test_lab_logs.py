@@ -1,6 +1,5 @@
 """Every command that reads a log of the paper's authors reports its problems and their position in the same words."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +11,10 @@ from experiments.lablogs.estimates import EvaluatedLog, read_log
 from firmware_host.configuration.loading import parse_configuration
 from logs.lab.lab_csv import read_lab_csv
 from logs.replay import Replay
-from tests.command_line.command_lines import json_of, run
+from tests.command_line.command_lines import failure, json_of, output, refusal, run
 from tests.lab_logs import SETTINGS, lab_columns, write_lab_log
 
 pytestmark = pytest.mark.usefixtures("png_alone")
-
-COMMANDS = {
-    "replay": ("replay",),
-    "log info": ("log", "info"),
-    "log report": ("log", "report", "--out", "report"),
-    "plot": ("plot", "--out", "walk.png"),
-}
-each_command = pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
 
 
 @pytest.fixture
@@ -35,32 +26,30 @@ def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_lab_log(tmp_path / "hung.csv", columns, SETTINGS | {"insertion_angle": ""})
 
 
-@each_command
-def test_findings_are_warnings_of_every_command(command: tuple[str, ...], hung: Path) -> None:
-    ended = run(*command, str(hung))
+@pytest.mark.parametrize("command", ["replay", "log info", "log report --out report", "plot --out walk.png"])
+def test_findings_are_warnings_of_every_command(command: str, hung: Path) -> None:
+    ended = run(*command.split(), str(hung))
     assert ended.returncode == exit_codes.OK
     (stuck,) = [line for line in ended.stderr.splitlines() if "rightsweeping_curr" in line]
     assert str(hung) in stuck and "at 2.800 s" in stuck and "0.50 s" in stuck
     assert any("insertion_angle" in line for line in ended.stderr.splitlines())
 
 
-@pytest.mark.parametrize("command", [COMMANDS[name] for name in ("replay", "log info")], ids=" ".join)
-def test_findings_are_a_list_for_programs(command: tuple[str, ...], hung: Path) -> None:
-    ended = run(*command, str(hung), "--json")
-    setting, stuck = json.loads(ended.stdout)["findings"]
+@pytest.mark.parametrize("command", ["replay", "log info"])
+def test_findings_are_a_list_for_programs(command: str, hung: Path) -> None:
+    setting, stuck = json_of(*command.split(), str(hung))["findings"]
     assert (setting["kind"], setting["column"], setting["time_s"], setting["line"]) == ("missing setting", *[None] * 3)
     assert stuck["kind"] == "stuck signal" and stuck["file"] == str(hung)
     assert (stuck["column"], stuck["time_s"], stuck["line"]) == ("rightsweeping_curr", 2.8, 564)
 
 
-@pytest.mark.parametrize("command", [COMMANDS["replay"], COMMANDS["plot"]], ids=" ".join)
-def test_nonsense_is_refused_by_every_command(command: tuple[str, ...], hung: Path) -> None:
+@pytest.mark.parametrize("command", ["replay", "plot"])
+def test_nonsense_is_refused_by_every_command(command: str, hung: Path) -> None:
     columns = lab_columns()
     columns["leftsweeping_pos"] = columns["leftsweeping_pos"] * 360.0
     path = write_lab_log(hung.parent / "degrees.csv", columns)
-    ended = run(*command, str(path))
-    assert ended.returncode == exit_codes.UNHEALTHY and "Traceback" not in ended.stderr
-    assert "degrees.csv: line" in ended.stderr and "column leftsweeping_pos" in ended.stderr
+    message = failure(command, str(path))
+    assert "degrees.csv: line" in message and "column leftsweeping_pos" in message
 
 
 def test_log_info_describes_a_csv(hung: Path) -> None:
@@ -71,7 +60,7 @@ def test_log_info_describes_a_csv(hung: Path) -> None:
     assert info["distinct_rate_hz"] == pytest.approx(200.0, rel=0.01)
     assert info["flippers"] == ["left", "right"] and info["strides"] == 3
     assert info["settings"]["lateral_angle_range"] == 0.5 and info["missing_settings"] == ["insertion_angle"]
-    shown = run("log", "info", str(hung)).stdout
+    shown = output("log", "info", str(hung))
     assert "missing_settings   insertion_angle" in shown and "lateral_angle_range 0.5" in shown
 
 
@@ -87,13 +76,13 @@ def z_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_lab_log(tmp_path / "z_up.csv", columns)
 
 
-@pytest.mark.parametrize("command", [COMMANDS["replay"], COMMANDS["log info"]], ids=" ".join)
-def test_every_command_takes_the_vertical_axis_of_the_capture(command: tuple[str, ...], z_up: Path) -> None:
-    assert "sinks by" not in run(*command, str(z_up)).stderr
-    ended = run(*command, str(z_up), "--vertical", "z")
+@pytest.mark.parametrize("command", ["replay", "log info"])
+def test_every_command_takes_the_vertical_axis_of_the_capture(command: str, z_up: Path) -> None:
+    words = (*command.split(), str(z_up))
+    assert "sinks by" not in run(*words).stderr
+    ended = run(*words, "--vertical", "z")
     assert ended.returncode == exit_codes.OK and "sinks by 61 mm" in ended.stderr
-    refused = run(*command, str(z_up), "--vertical", "w")
-    assert refused.returncode == exit_codes.USAGE and "--vertical" in refused.stderr
+    assert "--vertical" in refusal(*words, "--vertical", "w")
 
 
 def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:

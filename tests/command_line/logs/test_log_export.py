@@ -11,10 +11,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.logs import log_export
-from command_line.main import main
 from logs.files.log_reader import read_log
 from logs.files.scanned_log import ScannedLog, scan_logs
-from tests.command_line.command_lines import failure, refusal
+from tests.command_line.command_lines import failure, output, refusal, run
 from tests.folders import ROOT
 from tests.full_disk import files_of_at_most
 
@@ -24,14 +23,14 @@ FORMS = {"--csv": "walk.csv", "--parquet": "tables"}
 
 def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "tables"
-    assert main(["log", "export", "--parquet", LOG, "--out", str(folder)]) == exit_codes.OK
+    output("log", "export", "--parquet", LOG, "--out", str(folder))
     names = {path.name for path in folder.iterdir()}
     assert names == {f"walk_0_1-{part}.parquet" for part in ("ticks", "strides", "events")}
 
 
 def test_a_csv_has_seconds_from_its_beginning_turns_and_currents_with_their_sign(tmp_path: Path) -> None:
     path, ticks = tmp_path / "walk.csv", read_log(Path(LOG)).ticks
-    assert main(["log", "export", "--csv", LOG, "--out", str(path)]) == exit_codes.OK
+    output("log", "export", "--csv", LOG, "--out", str(path))
     rows = np.genfromtxt(path, delimiter=",", skip_header=2, names=True)
     assert rows["time"] == pytest.approx(ticks["stamp_s"] - ticks["stamp_s"][0], abs=1e-6)
     for number, joint in enumerate(("leftsweeping", "leftadduction", "rightsweeping", "rightadduction")):
@@ -50,8 +49,7 @@ def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path) -> None:
 
 def test_parquet_into_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    message = refusal("log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
-    assert "name a folder" in message
+    assert "name a folder" in refusal("log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
 
 
 def rows_of(form: str, out: Path) -> int:
@@ -61,14 +59,13 @@ def rows_of(form: str, out: Path) -> int:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_an_export_of_a_log_that_was_cut_off_has_everything_before_and_says_so(
-    form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_export_of_a_log_that_was_cut_off_has_everything_before_and_says_so(form: str, tmp_path: Path) -> None:
     log, out = tmp_path / "walk.mcap", tmp_path / FORMS[form]
     contents = Path(LOG).read_bytes()
     log.write_bytes(contents[: len(contents) // 2])
-    assert main(["log", "export", form, str(log), "--out", str(out)]) == exit_codes.OK
-    assert capsys.readouterr().err.count("the log was cut off: everything up to there was read") == 1
+    ended = run("log", "export", form, str(log), "--out", str(out))
+    assert ended.returncode == exit_codes.OK
+    assert ended.stderr.count("the log was cut off: everything up to there was read") == 1
     assert rows_of(form, out) == read_log(log).rows > 1000
 
 

@@ -23,6 +23,10 @@ def make_log(folder: Path, name: str) -> LogFile:
     return log
 
 
+def states_in(folder: Path) -> dict[str, str]:
+    return {log["name"]: log["state"] for log in json_of("log", "list", str(folder))["logs"]}
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Return a folder with a finished log and one whose writer was killed."""
@@ -33,11 +37,10 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_log_that_is_being_written_is_not_taken_for_one_that_was_cut_off(tmp_path: Path) -> None:
     log = make_log(tmp_path, "1.mcap")
-    assert [entry["state"] for entry in json_of("log", "list", str(tmp_path))["logs"]] == ["being written"]
-    printed = output("log", "list", str(tmp_path))
-    assert "being written" in printed and "recover" not in printed
+    assert states_in(tmp_path) == {"1.mcap": "being written"}
+    assert "recover" not in output("log", "list", str(tmp_path))
     log.finish()  # the listing left its lock in place
-    assert [entry["state"] for entry in json_of("log", "list", str(tmp_path))["logs"]] == ["whole"]
+    assert states_in(tmp_path) == {"1.mcap": "whole"}
 
 
 def test_incomplete_logs_are_listed_and_counted(folder: Path) -> None:
@@ -46,8 +49,7 @@ def test_incomplete_logs_are_listed_and_counted(folder: Path) -> None:
     (folder / "00.mcap").write_bytes(contents)
     for name in ("3.mcap.broken", "4.mcap.part", "notes.txt"):
         (folder / ACTIVE / name).write_bytes(bytes(100))
-    report = json_of("log", "list", str(folder))
-    assert {log["name"]: log["state"] for log in report["logs"]} == {
+    assert states_in(folder) == {
         "00.mcap": "copy",
         "0.mcap": "broken",
         "1.mcap": "whole",
@@ -56,6 +58,7 @@ def test_incomplete_logs_are_listed_and_counted(folder: Path) -> None:
         "4.mcap.part": "unfinished",
         "notes.txt": "no log",
     }
+    report = json_of("log", "list", str(folder))
     known = {log["name"]: (log["place"], log["duration_s"]) for log in report["logs"]}
     assert (known["1.mcap"], known["2.mcap"]) == ((DONE, pytest.approx(1.0)), (ACTIVE, None))
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file() and path.suffix != ".parquet"]
@@ -68,7 +71,7 @@ def test_logs_are_listed_in_the_order_of_their_segments(tmp_path: Path) -> None:
     (tmp_path / DONE).mkdir()
     for name in reversed(names):
         (tmp_path / DONE / name).write_bytes(b"no log")
-    assert [log["name"] for log in json_of("log", "list", str(tmp_path))["logs"]] == names
+    assert [*states_in(tmp_path)] == names
     assert [path.name for path in closed_logs(tmp_path)] == names
 
 

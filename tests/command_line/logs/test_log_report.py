@@ -9,7 +9,6 @@ import pytest
 
 from command_line import exit_codes
 from command_line.logs import log_report
-from command_line.main import main
 from control.controller import WalkOrder
 from control.records import JOINTS
 from experiments.run_report import run as run_module
@@ -20,7 +19,7 @@ from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.command_line.command_lines import failure, run
+from tests.command_line.command_lines import failure, json_of, output, run
 from tests.folders import SHARED_DATA
 from tests.recorded_walks import record_walks
 
@@ -30,12 +29,9 @@ UPTIME_S = 36384.0
 LAB_LOGS = SHARED_DATA / "flipper_in_mud"
 
 
-def test_the_page_shows_every_walk_stride_and_event(
-    two_walks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_shows_every_walk_stride_and_event(two_walks: Path, tmp_path: Path) -> None:
     folder = tmp_path / "report"
-    assert main(["log", "report", str(two_walks), "--out", str(folder), "--json"]) == exit_codes.OK
-    report = json.loads(capsys.readouterr().out)
+    report = json_of("log", "report", str(two_walks), "--out", str(folder))
     assert report == json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert report["schema"] == "log-report/1"
     log = read_log(two_walks)
@@ -57,7 +53,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, *words: str) -> tuple[dict[str, str],
         return []
 
     monkeypatch.setattr(log_report, "write_result", take)
-    assert main(["log", "report", *words]) == exit_codes.OK
+    output("log", "report", *words)
     (result,) = results
     return dict(result.texts), {table.title or table.section: table.cells() for table in result.tables}
 
@@ -105,13 +101,13 @@ def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, mon
 def test_a_log_that_is_cut_off_before_its_first_stride_ends_is_named_in_headline_json_and_exit_status(
     configuration: Configuration, tmp_path: Path
 ) -> None:
-    recorder = FileRecorder(tmp_path / "cut.mcap", configuration)
+    path = tmp_path / "cut.mcap"
+    recorder = FileRecorder(path, configuration)
     robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder)
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 1))
     robot.run_for(0.3)
     recorder.close()
-    path = tmp_path / "cut.mcap"
     path.write_bytes(path.read_bytes()[:-100])
     ended = run("log", "report", str(path), "--out", str(tmp_path / "page"), "--json")
     report = json.loads(ended.stdout)
@@ -123,7 +119,7 @@ def test_a_log_that_is_cut_off_before_its_first_stride_ends_is_named_in_headline
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
 def test_the_authors_logs_have_a_page_too_with_the_mud_of_their_name(tmp_path: Path) -> None:
     log = LAB_LOGS / "single_12.5N_trial5.csv.gz"
-    assert main(["log", "report", str(log), "--out", str(tmp_path)]) == exit_codes.OK
+    output("log", "report", str(log), "--out", str(tmp_path))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<td>12.5 N</td>" in page and "No fault" not in page
     assert (tmp_path / "strides-1.png").exists() and (tmp_path / log.name).exists()
@@ -132,21 +128,13 @@ def test_the_authors_logs_have_a_page_too_with_the_mud_of_their_name(tmp_path: P
 # several runs
 
 
-@pytest.fixture(scope="module")
-def another_walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
-    path = tmp_path_factory.mktemp("logs") / "another.mcap"
-    record_walks(path, configuration, 3)
-    return path
-
-
 def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
-    two_walks: Path, another_walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    two_walks: Path, tmp_path: Path, configuration: Configuration
 ) -> None:
     """Both runs are in the same simulated mud, so no coefficient differs."""
-    out = tmp_path / "out"
-    words = ["log", "report", str(two_walks), str(another_walk), "--mud", "48.5=60", "--out", str(out), "--json"]
-    assert main(words) == exit_codes.OK
-    report = json.loads(capsys.readouterr().out)
+    another, out = tmp_path / "another.mcap", tmp_path / "out"
+    record_walks(another, configuration, 3)
+    report = json_of("log", "report", str(two_walks), str(another), "--mud", "48.5=60", "--out", str(out))
     assert report["schema"] == "log-comparison/1"
     assert [each["run"] for each in report["runs"]] == ["two", "another"]
     quantities = {each["quantity"]: each for each in report["differences"]}
@@ -163,32 +151,25 @@ def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
 # bad input gives one sentence each
 
 
-@pytest.fixture
-def log(two_walks: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
-
-
-def test_logs_that_cannot_be_read_are_refused_by_name(log: Path) -> None:
-    folder = log.parent
-    text, broken, missing = folder / "notes.txt", folder / "broken.mcap", folder / "missing.mcap"
+def test_logs_that_cannot_be_read_are_refused_by_name(two_walks: Path, tmp_path: Path) -> None:
+    text, broken, missing, table = (tmp_path / name for name in ("notes.txt", "broken.mcap", "missing.mcap", "t.csv"))
     text.write_text("no log", encoding="utf-8")
-    (folder / "table.csv").write_text("a,b\n1,2\n", encoding="utf-8")
-    contents = log.read_bytes()
+    table.write_text("a,b\n1,2\n", encoding="utf-8")
+    contents = two_walks.read_bytes()
     broken.write_bytes(contents[: len(contents) // 2] + bytes(4000) + contents[len(contents) // 2 + 4000 :])
-    for path in (text, broken, missing, folder / "table.csv"):
-        for words in ([str(path)], [str(log), str(path)]):
-            message = failure("log", "report", *words, "--out", str(folder / "out"))
+    for path in (text, broken, missing, table):
+        for words in ([str(path)], [str(two_walks), str(path)]):
+            message = failure("log", "report", *words, "--out", str(tmp_path / "out"))
             assert message.startswith(f"mudskipper: {path}: ")
-    assert not (folder / "out").exists()
+    assert not (tmp_path / "out").exists()
 
 
-def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path) -> None:
-    assert f"{log}: given twice" in failure("log", "report", str(log), str(log))
-    (log.parent / "other").mkdir()
-    other = str(shutil.copy(log, log.parent / "other"))
-    assert f"{other}: has the name of {log}" in failure("log", "report", str(log), other)
-    (log.parent / "file").write_text("", encoding="utf-8")
-    assert "Not a directory" in failure("log", "report", str(log), "--out", str(log.parent / "file" / "out"))
+def test_a_log_given_twice_and_an_unwritable_folder_are_refused(two_walks: Path, tmp_path: Path) -> None:
+    log, other = str(two_walks), str(shutil.copy(two_walks, tmp_path))
+    assert f"{log}: given twice" in failure("log", "report", log, log)
+    assert f"{other}: has the name of {log}" in failure("log", "report", log, other)
+    (tmp_path / "file").touch()
+    assert "Not a directory" in failure("log", "report", log, "--out", str(tmp_path / "file" / "out"))
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
