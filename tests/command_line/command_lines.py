@@ -26,12 +26,18 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
     return subprocess.CompletedProcess(arguments, status, out.getvalue(), err.getvalue())
 
 
+def start_process(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """Start a command in a process of its own, with pipes for what it prints."""
+    command = [sys.executable, "-u", "-m", "command_line.main", *arguments]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=os.environ | environment)
+
+
 def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a command in a process of its own."""
-    command = [sys.executable, "-m", "command_line.main", *arguments]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
-    )
+    """Run a command in a process of its own to its end."""
+    with start_process(*arguments, **environment) as process:
+        printed, complaints = process.communicate(timeout=LONGEST_S)
+    return subprocess.CompletedProcess(arguments, process.returncode, printed, complaints)
 
 
 def output(*arguments: str) -> str:

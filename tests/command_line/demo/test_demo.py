@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -13,12 +12,8 @@ import pytest
 
 from command_line import exit_codes
 from logs.files.log_reader import read_log
+from tests.command_line.command_lines import start_process
 from tests.waiting import LONGEST_S
-
-
-def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-u", "-m", "command_line.main", "demo", "--out", str(out), *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) -> tuple[str, str]:
@@ -60,7 +55,7 @@ def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> 
         ),
         encoding="utf-8",
     )
-    with start_demo(tmp_path / "out", "--world", str(world), "--json") as demo:
+    with start_process("demo", "--out", str(tmp_path / "out"), "--world", str(world), "--json") as demo:
         answer, printed = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode == exit_codes.OK
     assert "Walking 0.30 m over mud with 48.5 %, 1500 Pa, 48.5 % water." in printed
@@ -83,7 +78,7 @@ def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> 
 
 def test_ctrl_c_in_a_walk_over_the_three_muds_stops_the_robot_and_closes_the_log(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with start_demo(out) as demo:
+    with start_process("demo", "--out", str(out)) as demo:
         printed, complaints = interrupt(demo, signal.SIGINT, "left ")
     assert "Walking 1.83 m over mud with 48.5 %, 53.1 %, 45.3 % water." in printed
     assert "torque is off" in complaints
@@ -97,7 +92,7 @@ def test_ctrl_c_in_a_walk_over_the_three_muds_stops_the_robot_and_closes_the_log
 
 def test_a_daemon_that_stood_still_ends_the_demo_with_the_missed_ticks_and_the_log(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with start_demo(out) as demo:
+    with start_process("demo", "--out", str(out)) as demo:
         assert demo.stdout is not None
         shown = next(line for line in demo.stdout if line.startswith("left "))
         children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text(encoding="ascii").split()
@@ -116,7 +111,7 @@ def test_a_daemon_that_stood_still_ends_the_demo_with_the_missed_ticks_and_the_l
 
 @pytest.mark.parametrize(("number", "line"), [(signal.SIGINT, ""), (signal.SIGTERM, "Arming")])
 def test_a_signal_before_the_walk_leaves_no_process(tmp_path: Path, number: signal.Signals, line: str) -> None:
-    with start_demo(tmp_path / "out") as demo:
+    with start_process("demo", "--out", str(tmp_path / "out")) as demo:
         _, complaints = interrupt(demo, number, line)
     assert "stopped" in complaints
     assert children_of(tmp_path / "out") == []

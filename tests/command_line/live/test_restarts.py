@@ -1,15 +1,13 @@
 """The page continues after the daemon, `mudskipper live` or both were stopped and started again, as processes."""
 
 import json
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.client import HTTPConnection
 from typing import Any
 
+from tests.command_line.command_lines import start_process
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
@@ -49,16 +47,13 @@ class Page:
 @contextmanager
 def serving(bench: Bench, port: int = 0) -> Iterator[int]:
     """Run `mudskipper live --page`, and yield its port."""
-    command = [sys.executable, "-m", "command_line.main", "live", "--page", "--port", str(port)]
-    environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
-    assert process.stdout is not None and process.stderr is not None
-    try:
+    with start_process("live", "--page", "--port", str(port), MUDSKIPPER_SOCKET=str(bench.socket)) as process:
+        assert process.stdout is not None
         address = process.stdout.readline()  # "Serving on http://127.0.0.1:8080/. Ctrl-C ends."
-        yield int(address.split(f"{ADDRESS}:")[1].split("/")[0])
-    finally:
-        process.terminate()
-        process.communicate(timeout=LONGEST_S)
+        try:
+            yield int(address.split(f"{ADDRESS}:")[1].split("/")[0])
+        finally:
+            process.terminate()
 
 
 def test_a_page_that_stays_open_shows_the_daemon_that_was_started_again(own_bench: Bench) -> None:

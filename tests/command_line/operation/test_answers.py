@@ -12,11 +12,12 @@ from command_line.operation.confirmation import TORQUE_UNKNOWN, send_order, unco
 from control.records import JOINTS
 from operator_client.status_client import CallRefusedError, DroppedError, NotPermittedError
 from simulation.harness.local_setup import named_folder
-from tests.command_line.command_lines import run
+from tests.command_line.command_lines import failure, json_of, run
 from tests.command_line.fake_client import answer_with, next_of
 
 REFUSAL = "status is for members of the group mudskipper. Have root run 'adduser YOU mudskipper', then log in again"
 Report = dict[str, Any]
+each_ending = pytest.mark.parametrize("command", ["stop", "disarm"])
 
 
 def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:
@@ -69,7 +70,7 @@ def test_an_adaptive_walk_leaves_out_the_depths_of_its_gait(adaptive: bool, monk
     assert ("depths_m" in ordered[0]) is not adaptive
 
 
-@pytest.mark.parametrize("command", ["stop", "disarm"])
+@each_ending
 @pytest.mark.parametrize("mode", ["idle", "fault"])
 def test_confirmed_idle_drives_are_a_success(command: str, mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     unconfirmed = report("walking", True, -1.0), report(mode, True, -1.0)
@@ -78,22 +79,19 @@ def test_confirmed_idle_drives_are_a_success(command: str, mode: str, monkeypatc
     assert (ended.returncode, ended.stdout, ended.stderr) == (exit_codes.OK, f"{mode}\n", "")
 
 
-def test_programs_read_the_mode_of_a_confirmed_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    answer_with(monkeypatch, next_of(report("hold", True, -1.0)))
-    confirmed = {"schema": "operation/1", "command": "stop", "mode": "hold", "notice": ""}
-    assert loads(run("stop", "--json").stdout) == confirmed
-    answer_with(monkeypatch, next_of(report("hold", True, -1.0, {"heartbeat_age_s": 3.0})))
-    assert loads(run("stop", "--json").stdout)["status"] == exit_codes.TORQUE_UNKNOWN
-
-
 def test_a_held_pose_is_the_success_of_a_stop_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     answer_with(monkeypatch, next_of(report("hold", True, -1.0)))
-    assert run("stop").returncode == exit_codes.OK
+    assert json_of("stop") == {"schema": "operation/1", "command": "stop", "mode": "hold", "notice": ""}
     ended = run("disarm")
     assert ended.returncode == exit_codes.TIMED_OUT and TORQUE_UNKNOWN in ended.stderr
 
 
-@pytest.mark.parametrize("command", ["stop", "disarm"])
+def test_programs_read_that_a_stop_is_not_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer_with(monkeypatch, next_of(report("hold", True, -1.0, {"heartbeat_age_s": 3.0})))
+    assert loads(run("stop", "--json").stdout)["status"] == exit_codes.TORQUE_UNKNOWN
+
+
+@each_ending
 @pytest.mark.parametrize("changed", [{"closed_loop": True}, {"heartbeat_age_s": None}, {"heartbeat_age_s": 3.0}])
 def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
     command: str, changed: Report, monkeypatch: pytest.MonkeyPatch
@@ -106,11 +104,10 @@ def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
     assert answer.startswith(TORQUE_UNKNOWN) and "left_adduction" in answer
 
 
-@pytest.mark.parametrize("command", ["stop", "disarm"])
+@each_ending
 def test_a_stop_that_is_interrupted_is_not_confirmed(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     answer_with(monkeypatch, next_of(KeyboardInterrupt()))
-    ended = run(command)
-    assert ended.returncode == exit_codes.INTERRUPTED and TORQUE_UNKNOWN in ended.stderr
+    assert TORQUE_UNKNOWN in failure(command, status=exit_codes.INTERRUPTED)
 
 
 # a user who may stop the robot, and nothing else
@@ -120,7 +117,7 @@ def for_stops_alone(method: str) -> Any:
     return "accepted" if method in ("stop", "disarm") else NotPermittedError(REFUSAL)
 
 
-@pytest.mark.parametrize("command", ["stop", "disarm"])
+@each_ending
 def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
     command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,16 +130,13 @@ def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
 @pytest.mark.parametrize("command", ["status", "arm", "walk", "walk --attended", "clear", "check"])
 def test_anything_else_is_not_permitted(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     answer_with(monkeypatch, for_stops_alone)
-    ended = run(*command.split())
-    assert (ended.returncode, ended.stderr) == (exit_codes.NOT_PERMITTED, f"mudskipper: {REFUSAL}\n")
+    assert failure(*command.split(), status=exit_codes.NOT_PERMITTED) == f"mudskipper: {REFUSAL}"
 
 
 @pytest.mark.parametrize("command", ["status", "check", "clear"])
 def test_a_closed_connection_is_not_reported_as_a_missing_daemon(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     answer_with(monkeypatch, lambda method: DroppedError("the daemon closed the connection"))
-    ended = run(command)
-    assert (ended.returncode, ended.stdout) == (exit_codes.NO_DAEMON, "")
-    assert ended.stderr == "mudskipper: the daemon closed the connection\n"
+    assert failure(command, status=exit_codes.NO_DAEMON) == "mudskipper: the daemon closed the connection"
 
 
 # clear
@@ -171,9 +165,8 @@ def test_a_refused_clear_names_the_cause_and_what_ends_it(
     socket = named_folder(bus) / "mudskipper.sock" if bus else tmp_path / "robot" / "mudskipper.sock"
     todo = {"power_cut": "release the switch", "joint_position": "move it back"}[name]
     answer_with(monkeypatch, next_of(report("fault", False) | {"causes": [cause(name, todo)]}))
-    ended = run("clear", "--socket", str(socket))
-    assert ended.returncode == exit_codes.REFUSED
-    assert ended.stderr == f"mudskipper: the cause is still there: It is {name}. {advice}\n"
+    refused = failure("clear", "--socket", str(socket), status=exit_codes.REFUSED)
+    assert refused == f"mudskipper: the cause is still there: It is {name}. {advice}"
 
 
 # arm --wait
@@ -198,5 +191,5 @@ def test_only_what_ends_by_itself_is_waited_for(
 def test_a_wrong_value_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     refusals = iter([CallRefusedError("force = 'TYPO': must be one of joint_position")])
     answer_with(monkeypatch, lambda method: next(refusals) if method == "arm" else {"mode": "idle", "notice": ""})
-    ended = run("arm", "--wait", "--force", "TYPO")
-    assert ended.returncode == exit_codes.REFUSED and ended.stderr.startswith("mudskipper: force = 'TYPO'")
+    refused = failure("arm", "--wait", "--force", "TYPO", status=exit_codes.REFUSED)
+    assert refused.startswith("mudskipper: force = 'TYPO'")

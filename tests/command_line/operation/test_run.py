@@ -128,7 +128,6 @@ def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.
     ("body", "named"),
     [
         ("return 1 / 0", ("ZeroDivisionError", "line 3")),
-        ("raise SystemExit(0)", ("SystemExit", "line 3")),
         ("raise __import__('asyncio').CancelledError", ("CancelledError", "line 3")),
         ("return __import__('json').loads('')", ("JSONDecodeError", "line 3")),
         ("return 'deep'", ("'deep'",)),
@@ -199,7 +198,7 @@ def test_a_law_with_a_rate_moves_joints_by_the_status_until_the_robot_holds_no_m
 
 @pytest.mark.parametrize(
     ("bad", "named"),
-    [("1 / 0", "ZeroDivisionError"), ("'up'", "'up'"), ("None", "None"), ("{'left_sweep_rad': float('nan')}", "nan")],
+    [("1 / 0", "ZeroDivisionError"), ("'up'", "'up'"), ("{'left_sweep_rad': float('nan')}", "nan")],
 )
 def test_a_law_of_joints_that_fails_stops_the_robot(
     holding: HoldingRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str], bad: str, named: str
@@ -210,7 +209,7 @@ def test_a_law_of_joints_that_fails_stops_the_robot(
     assert named in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("rate_hz", ["0.0", "51", "float('nan')", "'20'", "None"])
+@pytest.mark.parametrize("rate_hz", ["0.99", "50.01", "float('nan')", "'20'"])
 def test_a_rate_out_of_bounds_is_refused_before_the_robot_moves(tmp_path: Path, rate_hz: str) -> None:
     with pytest.raises(CommandError, match="RATE_HZ") as refused:
         run.run(joint_law(tmp_path, "return {}", rate_hz), socket=tmp_path)
@@ -234,7 +233,6 @@ def test_a_file_without_a_law_is_refused_before_the_robot_walks(tmp_path: Path, 
 @pytest.mark.parametrize("path", sorted(LAWS.glob("*.py")), ids=lambda path: path.stem)
 def test_the_examples_order_depths_that_the_robot_reaches(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", (LAWS / "paper_rule.py").open())  # a file that is ready, with + and - in it
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= 40
     example, rate_hz = run.load_law(str(path))
     assert rate_hz == 0.0
     for k_e, step_m in ((3e6, 0.03), (3e5, 0.001), (3e7, 0.0)):

@@ -4,7 +4,6 @@ import os
 import pty
 import select
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 
 from command_line import exit_codes
 from control.modes import Mode
+from tests.command_line.command_lines import start_process
 from tests.command_line.watch.served_robot import ServedRobot
 from tests.waiting import LONGEST_S
 
@@ -24,7 +24,6 @@ def test_a_pipe_gets_plain_lines_also_over_a_restart(
     walked: ServedRobot, resting: ServedRobot, short_folder: Path
 ) -> None:
     path = short_folder / "s"
-    command = [*WATCH, "--socket", str(path), "--period", "0.05"]
     lines: list[str] = []
 
     def read_until(text: str) -> None:
@@ -35,17 +34,15 @@ def test_a_pipe_gets_plain_lines_also_over_a_restart(
         lines.append(line)
 
     with walked.served(path):
-        watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        watch = start_process("watch", "--socket", str(path), "--period", "0.05")
         read_until("walking, stride")
     read_until("torque unknown")
     with resting.served(path):
         read_until("idle")
         watch.send_signal(signal.SIGINT)
-        assert watch.wait(LONGEST_S) == exit_codes.INTERRUPTED
-    assert watch.stdout is not None and watch.stderr is not None
-    assert watch.stderr.read() == "" and "\033" not in "".join(lines) + watch.stdout.read()
-    watch.stdout.close()
-    watch.stderr.close()
+        rest, complaints = watch.communicate(timeout=LONGEST_S)
+    assert (watch.returncode, complaints) == (exit_codes.INTERRUPTED, "")
+    assert "\033" not in "".join(lines) + rest
 
 
 class Terminal:
