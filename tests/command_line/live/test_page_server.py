@@ -4,7 +4,7 @@ import json
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from http.client import HTTPConnection
 from math import nan
 from pathlib import Path
@@ -15,7 +15,6 @@ import pytest
 from command_line.live.page_server import KEPT, PageServer, robot_facts
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK
-from firmware_host.sockets.connection import Caller
 from operator_client.live_rows import LiveRow
 from tests.command_line.watch.served_robot import ServedRobot, resting_robot
 
@@ -24,37 +23,30 @@ ADDRESS = "127.0.0.1"
 
 @pytest.fixture
 def page(short_folder: Path) -> Iterator[PageServer]:
-    server = PageServer(ADDRESS, 0, short_folder / "no daemon")
-    yield server
-    server.close()
+    with closing(PageServer(ADDRESS, 0, short_folder / "no daemon")) as server:
+        yield server
 
 
 def ticks(*stamps_s: float) -> list[LiveRow]:
     return [LiveRow(TICK, TICK.encode_named(stamp_s=stamp_s, body_x_m=nan)) for stamp_s in stamps_s]
 
 
+def answer_of(page: PageServer, method: str, path: str, address: str = ADDRESS, **headers: str) -> tuple[int, str]:
+    """Return the status and the text with which a request is answered."""
+    with closing(HTTPConnection(address, page.port, timeout=60)) as connection:
+        connection.request(method, path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        response = connection.getresponse()
+        return response.status, response.read().decode()
+
+
 def ask(page: PageServer, after: int = -1) -> dict[str, Any]:
     """Return what a page gets that has all up to a number."""
-    connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request("GET", f"/rows?after={after}")
-    return dict(json.loads(connection.getresponse().read()))
-
-
-def post(page: PageServer, path: str = "/stop", body: str = "", **headers: str) -> tuple[int, str]:
-    connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request(
-        "POST", path, body.encode(), headers={name.replace("_", "-"): value for name, value in headers.items()}
-    )
-    response = connection.getresponse()
-    return response.status, response.read().decode()
+    return dict(json.loads(answer_of(page, "GET", f"/rows?after={after}")[1]))
 
 
 def test_a_browser_gets_the_page_and_it_needs_nothing_else(page: PageServer) -> None:
-    connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request("GET", "/")
-    response = connection.getresponse()
-    content = response.read().decode()
-    assert response.status == 200 and "STOP" in content
+    status, content = answer_of(page, "GET", "/")
+    assert status == 200 and "STOP" in content
     assert "http://" not in content and "https://" not in content
 
 
@@ -94,23 +86,11 @@ def test_a_browser_that_vanished_keeps_no_connection(page: PageServer, monkeypat
         assert connection.recv(1) == b""
 
 
-@pytest.fixture
-def open_page(short_folder: Path) -> Iterator[PageServer]:
-    server = PageServer("0.0.0.0", 0, short_folder / "no daemon", ["Robot.local"])
-    yield server
-    server.close()
-
-
+@pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="this computer has no IPv6")
 def test_an_address_of_ipv6_serves_the_page_to_a_browser_that_opens_it(short_folder: Path) -> None:
-    if not socket.has_dualstack_ipv6():
-        pytest.skip("this computer has no IPv6")
-    server = PageServer("::1", 0, short_folder / "no daemon")
-    try:
-        connection = HTTPConnection("::1", server.port, timeout=60)  # its Host is [::1]:PORT
-        connection.request("GET", "/")
-        assert connection.getresponse().status == 200
-    finally:
-        server.close()
+    with closing(PageServer("::1", 0, short_folder / "no daemon")) as server:
+        status, _ = answer_of(server, "GET", "/", "::1")  # its Host is [::1]:PORT
+    assert status == 200
 
 
 REACHES, REFUSED = 409, 403  # a stop without a daemon; one that does not reach it
@@ -130,18 +110,20 @@ HOSTS = {  # Host of a request to a server on 0.0.0.0, what Origin differs from 
 }
 
 
+@pytest.fixture
+def open_page(short_folder: Path) -> Iterator[PageServer]:
+    with closing(PageServer("0.0.0.0", 0, short_folder / "no daemon", ["Robot.local"])) as server:
+        yield server
+
+
 @pytest.mark.parametrize(("host", "origin", "own"), HOSTS.values(), ids=HOSTS)
 def test_every_route_serves_the_own_page_alone(open_page: PageServer, host: str, origin: str | None, own: bool) -> None:
     address = f"{host}:{open_page.port}" if host else ""
     headers = {"Host": address, "Origin": origin or f"http://{address}"}
-    status, text = post(open_page, X_Mudskipper="stop", **headers)
+    status, text = answer_of(open_page, "POST", "/stop", X_Mudskipper="stop", **headers)
     assert status == (REACHES if own else REFUSED) and "torque unknown: cut motor power" in text
     for path in ("/", "/rows?after=-1"):
-        connection = HTTPConnection(ADDRESS, open_page.port, timeout=60)
-        connection.request("GET", path, headers=headers)
-        response = connection.getresponse()
-        assert (response.status == 200) == own and response.status in (200, REFUSED)
-        connection.close()
+        assert answer_of(open_page, "GET", path, **headers)[0] == (200 if own else REFUSED)
 
 
 @pytest.mark.parametrize("length", ["Content-Length: {}", "Transfer-Encoding: chunked"])
@@ -167,34 +149,21 @@ def test_a_length_that_is_no_number_of_python_s_is_answered(page: PageServer) ->
 
 @pytest.mark.parametrize("headers", [{}, {"X_Mudskipper": "go"}], ids=str)
 def test_a_stop_without_the_page_s_header_is_refused(page: PageServer, headers: dict[str, str]) -> None:
-    status, text = post(page, **headers)
+    status, text = answer_of(page, "POST", "/stop", **headers)
     assert status == REFUSED and "torque unknown: cut motor power" in text
 
 
 def test_the_page_learns_whether_a_stop_would_reach_the_robot(
     page: PageServer, configuration: Configuration, short_folder: Path
 ) -> None:
-    assert post(page, path="/can_stop", X_Mudskipper="stop")[0] == REACHES
-    robot = ServedRobot(resting_robot(configuration))
-    answer, asked = robot.methods["status"], []
-
-    def status(params: dict[str, Any], caller: Caller) -> Any:
-        asked.append(params)
-        return answer(params, caller)
-
-    robot.methods["status"] = status
-    with robot.served(short_folder / "no daemon"):
-        page_of_robot = PageServer(ADDRESS, 0, short_folder / "no daemon")
-        answers = [post(page_of_robot, path="/can_stop", X_Mudskipper="stop") for _ in range(10)]
-        page_of_robot.close()
+    assert answer_of(page, "POST", "/can_stop", X_Mudskipper="stop")[0] == REACHES
+    robot, socket_path = ServedRobot(resting_robot(configuration)), short_folder / "no daemon"
+    asked = robot.calls_of("status")
+    with robot.served(socket_path), closing(PageServer(ADDRESS, 0, socket_path)) as page_of_robot:
+        answers = [answer_of(page_of_robot, "POST", "/can_stop", X_Mudskipper="stop") for _ in range(10)]
     assert {status for status, _ in answers} == {200}
     assert len(json.loads(answers[0][1])["drives"]) == 4
     assert len(asked) < len(answers)  # pages share the daemon's answer
-
-
-def test_a_stop_without_a_daemon_says_to_cut_the_power(page: PageServer) -> None:
-    status, text = post(page, X_Mudskipper="stop")
-    assert status == 409 and "cut motor power" in text
 
 
 def test_a_configuration_of_another_version_still_draws_a_robot() -> None:

@@ -50,6 +50,18 @@ class ServedRobot:
     def ask(self, method: str, **params: Any) -> Any:
         return self.methods[method](params, NOBODY)
 
+    def calls_of(self, method: str) -> list[dict[str, Any]]:
+        """Return the list that the parameters of each later call of this method go into."""
+        calls: list[dict[str, Any]] = []
+        answer = self.methods[method]
+
+        def noted(params: dict[str, Any], caller: Caller) -> Any:
+            calls.append(params)
+            return answer(params, caller)
+
+        self.methods[method] = noted
+        return calls
+
     @property
     def mode(self) -> Mode:
         return self.robot.loop.mode

@@ -2,7 +2,6 @@
 
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +11,6 @@ from firmware_host.configuration.socket_paths import rows_path
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.row_stream import RowStream
 from firmware_host.log.rows import TICK, TICK_KIND
-from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.user_groups import load_rights
 from tests.command_line.watch.served_robot import ServedRobot
 
@@ -52,14 +50,7 @@ def test_with_rows_the_daemon_is_asked_less_often_and_the_screen_stays_current(
     recorded: tuple[ServedRobot, LastRow], short_folder: Path
 ) -> None:
     robot, recorder = recorded
-    asked: list[None] = []
-    status = robot.methods["status"]
-
-    def counted_status(params: dict[str, Any], caller: Caller) -> Any:
-        asked.append(None)
-        return status(params, caller)
-
-    robot.methods["status"] = counted_status
+    asked = robot.calls_of("status")
     rights = load_rights(StatusParameters())
     with robot.served(short_folder / "s"):
         stream = RowStream(rows_path(short_folder / "s"), rights, {})
