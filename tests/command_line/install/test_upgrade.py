@@ -27,6 +27,7 @@ from command_line.install.service_plan import (
 )
 from command_line.install.upgrade import key_changes, upgrade
 from control.modes import ENERGISED, Mode
+from tests.command_line.fake_client import FakeClient, next_of
 from tests.folders import ROOT
 
 PREFIX = Path(DEFAULT_PREFIX)
@@ -90,10 +91,6 @@ def test_a_check_names_keys_and_files_and_changes_nothing(
     assert before == {path: path.read_bytes() for path in computer.root.rglob("*") if path.is_file()}
 
 
-def test_an_upgrade_installs_the_package(computer: Computer) -> None:
-    assert computer.upgrade() == exit_codes.OK and computer.installed
-
-
 def test_no_upgrade_of_an_installation_that_is_no_package(computer: Computer) -> None:
     """dpkg would mix the package's files with those that pip installed, below a daemon that runs."""
     computer.is_package = False
@@ -115,12 +112,18 @@ def test_a_slow_dpkg_is_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert (tmp_path / "dpkg.done").exists()
 
 
-@pytest.mark.parametrize("mode", sorted(mode.name.lower() for mode in ENERGISED))
-def test_no_upgrade_while_drives_have_torque(computer: Computer, monkeypatch: pytest.MonkeyPatch, mode: str) -> None:
-    monkeypatch.setattr(upgrade_module, "energised_mode", lambda socket: mode)
-    with pytest.raises(CommandError, match=mode) as refused:
-        computer.upgrade()
-    assert refused.value.status == exit_codes.REFUSED and not computer.installed
+@pytest.mark.parametrize("mode", Mode)
+def test_it_is_installed_unless_drives_have_torque(
+    computer: Computer, monkeypatch: pytest.MonkeyPatch, mode: Mode
+) -> None:
+    name = mode.name.lower()
+    monkeypatch.setattr(upgrade_module, "StatusClient", lambda socket: FakeClient(next_of({"mode": name})))
+    if mode in ENERGISED:
+        with pytest.raises(CommandError, match=name) as refused:
+            computer.upgrade()
+        assert refused.value.status == exit_codes.REFUSED and not computer.installed
+    else:
+        assert computer.upgrade() == exit_codes.OK and computer.installed
 
 
 def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Computer) -> None:
