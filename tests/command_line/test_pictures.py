@@ -10,10 +10,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
-import command_line.logs.log_commands
-import experiments.pictures.stride_film
-from command_line import exit_codes
-from command_line.main import main
+from command_line.logs import log_commands
+from experiments.pictures import stride_film
 from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s
@@ -22,7 +20,7 @@ from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.style import OUTCOME_COLOURS
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
-from tests.command_line.command_lines import failure, refusal
+from tests.command_line.command_lines import failure, output, refusal, run
 
 
 def png_size(path: Path) -> tuple[int, int]:
@@ -39,39 +37,41 @@ def log(two_walks: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
 
 
+@pytest.fixture(scope="module")
+def walk(two_walks: Path) -> RecordedWalk:
+    """Read the first walk."""
+    return read_walk(two_walks, 1)
+
+
 # files
 
 
 @pytest.mark.parametrize(("command", "name", "width"), [("plot", "two.png", 1200), ("film", "two-strides.png", 1440)])
-def test_a_picture_of_the_last_walk_is_written_next_to_its_log(
-    command: str, name: str, width: int, log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([command, str(log)]) == exit_codes.OK
+def test_a_picture_of_the_last_walk_is_written_next_to_its_log(command: str, name: str, width: int, log: Path) -> None:
+    ended = run(command, str(log))
     assert png_size(log.with_name(name))[0] == width
-    printed = capsys.readouterr()
-    assert str(log.with_name(name)) in printed.out and "last of 2 walks" in printed.err
+    assert str(log.with_name(name)) in ended.stdout and "last of 2 walks" in ended.stderr
 
 
-def test_a_plot_can_have_other_names_and_formats(log: Path, tmp_path: Path) -> None:
+def test_a_plot_can_have_other_names_and_formats(two_walks: Path, tmp_path: Path) -> None:
     for name, start in (("figure.svg", b"<?xml"), ("figure.pdf", b"%PDF")):
-        assert main(["plot", str(log), "--walk", "1", "--out", str(tmp_path / name)]) == exit_codes.OK
+        output("plot", str(two_walks), "--walk", "1", "--out", str(tmp_path / name))
         assert (tmp_path / name).read_bytes().startswith(start)
 
 
-def test_a_strip_has_a_row_for_each_stride_asked_for(log: Path, tmp_path: Path) -> None:
+def test_a_strip_has_a_row_for_each_stride_asked_for(two_walks: Path, tmp_path: Path) -> None:
     heights = []
-    for strides in (["0"], ["0", "1"], ["1", "0", "1"]):
-        options = [word for stride in strides for word in ("--stride", stride)]
-        assert main(["film", str(log), "--walk", "1", *options, "--out", str(tmp_path / "strip.png")]) == exit_codes.OK
-        heights.append(png_size(tmp_path / "strip.png")[1])
+    for strides in ("--stride 0", "--stride 0 --stride 1", "--stride 1 --stride 0 --stride 1"):
+        path = tmp_path / "strip.png"
+        output("film", str(two_walks), "--walk", "1", *strides.split(), "--out", str(path))
+        heights.append(png_size(path)[1])
     rows = np.diff(heights)
     assert rows[0] > 100 and abs(rows[1] - rows[0]) < 0.1 * rows[0]  # rounding; each row is as wide as the widest
 
 
-def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
+def test_a_film_runs_in_real_time_for_ever(two_walks: Path, walk: RecordedWalk, tmp_path: Path) -> None:
     path = tmp_path / "walk.gif"
-    assert main(["film", str(log), "--walk", "1", "--stride", "1", "--out", str(path)]) == exit_codes.OK
-    walk = read_walk(log, 1)
+    output("film", str(two_walks), "--walk", "1", "--stride", "1", "--out", str(path))
     with Image.open(path) as film:
         assert (film.format, film.info["loop"]) == ("GIF", 0)
         shown_ms = 0
@@ -88,9 +88,8 @@ def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def figure(two_walks: Path) -> Figure:
-    """Draw the first walk."""
-    return draw_walk(read_walk(two_walks, 1))
+def figure(walk: RecordedWalk) -> Figure:
+    return draw_walk(walk)
 
 
 def panel(figure: Figure, label: str) -> Axes:
@@ -105,8 +104,7 @@ def row_of(figure: Figure, label: str) -> list[Axes]:
     return [axes for axes in figure.axes if (spec := axes.get_subplotspec()) and spec.rowspan == row[1].rowspan]
 
 
-def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) -> None:
-    walk = read_walk(two_walks, 1)
+def test_the_plot_shows_the_logs_own_numbers(walk: RecordedWalk, figure: Figure) -> None:
     lines = {str(line.get_label()): np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.lines}
     np.testing.assert_array_equal(lines["$f_z$ up"], walk.force_z_n)
     np.testing.assert_array_equal(lines["commanded"], 100.0 * walk.depth_command_m)
@@ -119,8 +117,7 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
-def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
-    walk = read_walk(two_walks, 1)
+def test_bars_of_a_coefficient_are_two_standard_errors(walk: RecordedWalk, figure: Figure, name: str) -> None:
     reported = [s for flipper in (0, 1) for s in walk.strides if s["flipper"] == flipper and np.isfinite(s[name])]
     marks = [each for axes in row_of(figure, f"${name}$") for each in axes.containers]
     bars = [bar[:, 1] for mark in marks for bar in mark[2][0].get_segments()]
@@ -130,8 +127,7 @@ def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: 
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
 
 
-def test_an_invalid_value_does_not_hide_the_valid_ones(two_walks: Path) -> None:
-    walk = read_walk(two_walks, 1)
+def test_an_invalid_value_does_not_hide_the_valid_ones(walk: RecordedWalk) -> None:
     first, *others = walk.strides
     wild = first | {"k_p": 1e9, "k_p_valid": False}
     usual, hollow = draw_walk(walk), draw_walk(walk._replace(strides=[wild, *others]))
@@ -141,12 +137,11 @@ def test_an_invalid_value_does_not_hide_the_valid_ones(two_walks: Path) -> None:
     assert len(drawn) == len(walk.strides) and max(drawn) < panel(hollow, "$k_p$").get_ylim()[1]
 
 
-def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
+def test_failed_strides_are_marked(walk: RecordedWalk) -> None:
     """A mark shows where a flipper was stuck when its stride closed; slipping and stuck strides have coloured bars.
 
     The body's stride is stuck if either flipper was.
     """
-    walk = read_walk(two_walks, 1)
     slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
     slipping["released"] = True
     left_stuck = draw_walk(walk._replace(strides=[slipping, stuck | {"released": True}, stuck | {"flipper": 0}]))
@@ -163,17 +158,15 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
         assert bars[outcome].get_paths()[0].get_extents().x0 == pytest.approx(stride["t_start_s"])
 
 
-def test_without_a_pose_or_on_a_fixed_base_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
-    walk = read_walk(two_walks, 1)
+def test_without_a_pose_or_on_a_fixed_base_there_are_no_panels_of_position(walk: RecordedWalk) -> None:
     for each in (walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), walk._replace(fixed_base=True)):
         labels = [axes.get_ylabel().split()[0] for axes in draw_walk(each).axes if axes.get_ylabel()]
         assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
 
 
 @pytest.mark.filterwarnings("error", "ignore::ResourceWarning")  # another test may have left a file open
-def test_strides_without_usable_estimates_are_drawn(two_walks: Path, tmp_path: Path) -> None:
+def test_strides_without_usable_estimates_are_drawn(walk: RecordedWalk, tmp_path: Path) -> None:
     """Estimates may be NaN, infinite, negative, or missing in a walk without duration."""
-    walk = read_walk(two_walks, 1)
     values = ((np.nan, np.nan), (np.inf, 1.0), (1e6, np.inf), (-1e6, 1.0))
     wild = [
         stride | {"k_p": value, "k_p_std_error": std_error}
@@ -183,8 +176,7 @@ def test_strides_without_usable_estimates_are_drawn(two_walks: Path, tmp_path: P
         draw_walk(each).savefig(tmp_path / "small.png", dpi=10)
 
 
-def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_walks: Path) -> None:
-    walk = read_walk(two_walks, 1)
+def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(walk: RecordedWalk) -> None:
     name = describe_mud(walk.strides)
     k_p = float(np.median([stride["k_p"] for stride in walk.strides])) / 1e6
     assert float(name.split()[1]) == pytest.approx(k_p, rel=0.05) and name.endswith("N/cm³")
@@ -198,8 +190,7 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
     ]
 
 
-def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:
-    walk = read_walk(two_walks, 1)
+def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(walk: RecordedWalk) -> None:
     position_m = np.linspace(0.0, 0.5, len(walk.time_s))
     track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
     regions = mud_regions(walk._replace(body_x_m=position_m), layout_of_track(track))
@@ -213,32 +204,20 @@ def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Pat
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
-def test_an_unknown_walk_and_an_unwritable_file_are_refused(command: str, log: Path) -> None:
-    assert "no walk 3, only 2" in failure(command, str(log), "--walk", "3")
-    out = log.parent / "nowhere" / "x.png"
-    assert f"{out} cannot be written" in failure(command, str(log), "--out", str(out))
+def test_an_unknown_walk_and_an_unwritable_file_are_refused(command: str, two_walks: Path, tmp_path: Path) -> None:
+    assert "no walk 3, only 2" in failure(command, str(two_walks), "--walk", "3")
+    out = tmp_path / "nowhere" / "x.png"
+    assert f"{out} cannot be written" in failure(command, str(two_walks), "--out", str(out))
 
 
-def test_an_unknown_stride_is_wrong_usage(log: Path) -> None:
-    message = refusal("film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
-    assert "--stride 2: this walk has 0 to 1" in message
-
-
-@pytest.fixture
-def no_strides(monkeypatch: pytest.MonkeyPatch) -> None:
-    def read(path: Path, number: int, *_: object) -> RecordedWalk:
-        return read_walk(path, number)._replace(strides=[])
-
-    monkeypatch.setattr(command_line.logs.log_commands, "read_walk", read)
-
-
-def test_without_strides_there_is_nothing_to_film(log: Path, no_strides: None) -> None:
-    assert "no complete stride" in failure("film", str(log), "--walk", "1")
-
-
-def test_a_film_without_end_is_refused(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command_line.logs.log_commands, "LONGEST_FILM_S", 2.0)
-    monkeypatch.setattr(experiments.pictures.stride_film, "FRAMES_PER_S", 2)
-    out = str(log.with_suffix(".gif"))
-    assert "choose with --stride" in refusal("film", str(log), "--walk", "1", "--out", out)
-    assert main(["film", str(log), "--walk", "1", "--out", out, "--stride", "1"]) == exit_codes.OK
+def test_a_film_of_strides_that_are_not_there_or_without_end_is_refused(
+    two_walks: Path, walk: RecordedWalk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    film = ("film", str(two_walks), "--walk", "1", "--out", str(tmp_path / "walk.gif"))
+    assert "--stride 2: this walk has 0 to 1" in refusal(*film, "--stride", "0", "--stride", "2")
+    monkeypatch.setattr(log_commands, "LONGEST_FILM_S", 2.0)
+    monkeypatch.setattr(stride_film, "FRAMES_PER_S", 2)
+    assert "choose with --stride" in refusal(*film)
+    output(*film, "--stride", "1")
+    monkeypatch.setattr(log_commands, "read_walk", lambda *_: walk._replace(strides=[]))
+    assert "no complete stride" in failure(*film)

@@ -124,9 +124,8 @@ def test_another_terminal_gets_no_second_attended_walk_and_ends_the_first_by_a_s
     assert walk.returncode == exit_codes.OK and printed.splitlines()[-1] == "hold"
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_the_robot_stops_when_the_command_is_killed_or_hangs(bench: Bench, number: signal.Signals) -> None:
+def test_the_robot_stops_when_the_command_hangs(bench: Bench) -> None:
     bench.run("arm")
     with attended(bench) as walk:
-        walk.send_signal(number)
+        walk.send_signal(signal.SIGSTOP)
         bench.wait_for(lambda report: report["mode"] not in ("walking", "stopping"))

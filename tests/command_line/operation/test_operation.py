@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.main import main
 from command_line.operation.confirmation import RESTING, TORQUE_UNKNOWN
 from control.modes import ENERGISED, Mode
 from firmware_host.configuration import socket_paths
@@ -52,13 +51,8 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     path = bench.stop_daemon()
     log, replayed = read_log(path), replay_files([path])
     assert path.stem.endswith("-0001_A_B_3") and log.complete
-    assert log_summary(log)["trial"] == {
-        "mud": "A/B",
-        "water": "49.5",
-        "trial": "3",
-        "tags": "wet,warm",
-        "note": "rain",
-    }
+    trial = {"mud": "A/B", "water": "49.5", "trial": "3", "tags": "wet,warm", "note": "rain"}
+    assert log_summary(log)["trial"] == trial
     assert any(event["text"].endswith(": it slips") for event in log.events)
     assert len(replayed.strides) >= 2 and replayed.segment == 0  # nothing before the trial is needed
     assert [stride.k_p.value for stride in replayed.strides] == [stride["k_p"] for stride in log.strides]
@@ -76,11 +70,8 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
     time.sleep(2.0 * WATCHDOG_S)  # only the drives' own watchdogs can have acted
     bench.restart_daemon()
     report = bench.wait_for(lambda report: report["mode"] == "idle")
-    assert json.loads(bench.run("trial", "--json").stdout) == {
-        "schema": "trial/1",
-        "defaults": defaults,
-        "present": {},
-    }
+    restored = {"schema": "trial/1", "defaults": defaults, "present": {}}
+    assert json.loads(bench.run("trial", "--json").stdout) == restored
     assert not any(drive["closed_loop"] for drive in report["drives"])
     assert {drive["errors"] for drive in report["drives"]} == {"watchdog expired"}
     assert report["fault"]["name"] == "drive_error"
@@ -110,14 +101,12 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     }
 
 
-def test_check_without_a_daemon_checks_what_it_can(
-    short_folder: Path, tmp_path: Path, example_text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_without_a_daemon_checks_what_it_can(short_folder: Path, tmp_path: Path, example_text: str) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text(example_text.replace('"can0"', '"nocan0"'), encoding="utf-8")
-    arguments = ["check", "--socket", str(short_folder / "none"), "--config", str(path), "--json"]
-    assert main(arguments) == exit_codes.UNHEALTHY
-    items = {item["id"]: item for item in json.loads(capsys.readouterr().out)}
+    ended = run("check", "--socket", str(short_folder / "none"), "--config", str(path), "--json")
+    assert ended.returncode == exit_codes.UNHEALTHY
+    items = {item["id"]: item for item in json.loads(ended.stdout)}
     assert not items["daemon"]["ok"] and items["configuration"]["ok"]
     assert "nocan0" in items["bus"]["text"] and items["bus"]["fix"]
     assert "of walking" in items["disk"]["text"]

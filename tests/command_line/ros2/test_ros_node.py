@@ -78,6 +78,11 @@ class Graph:
     def endpoints(self) -> list[Endpoint]:
         return [endpoint for endpoint in map(read_token, self.tokens) if endpoint]
 
+    def keys(self, services: int) -> dict[str, str]:
+        """Wait for a node with so many services, and return their keys by name."""
+        wait_until(lambda: len(self.endpoints()) == 1 + services)
+        return {endpoint.name: endpoint.key for endpoint in self.endpoints() if endpoint.name}
+
     def ask(self, key: str, number: int, attachment: bytes | None = None) -> list[Any]:
         """Call a service as rmw_zenoh does."""
         attachment = ATTACHMENT.pack(number, 10**18, len(GID), GID) if attachment is None else attachment
@@ -139,7 +144,7 @@ def test_every_topic_is_seen_and_every_message_decoded_by_other_code(graph: Grap
     assert seen == {topic: ("/mud1/mudskipper", name) for topic, name in wanted.items()}
 
 
-def test_the_messages_of_each_topic_are_numbered_from_one_and_made_for_subscribers_alone(graph: Graph) -> None:
+def test_the_messages_of_each_topic_are_numbered_from_one_for_their_subscribers(graph: Graph) -> None:
     publisher = RosNode(graph.own, 0, "", hashed=True).publisher("/joint_states", TOPICS["/joint_states"], "RIHS01_0")
     wait_until(lambda: publisher.is_wanted)
     for _ in range(3):
@@ -147,20 +152,15 @@ def test_the_messages_of_each_topic_are_numbered_from_one_and_made_for_subscribe
     wait_until(lambda: len(graph.received) == 3)
     attachments = [ATTACHMENT.unpack(sample.attachment.to_bytes()) for sample in graph.received]
     assert [number for number, *_ in attachments] == [1, 2, 3] and len({gid for *_, gid in attachments}) == 1
-    unheard = RosNode(graph.own, 0, "", hashed=True).publisher("/odom", "nav_msgs/msg/Odometry", "RIHS01_0")
-    assert isinstance(unheard.is_wanted, bool)
 
 
 def test_a_service_answers_with_the_number_and_the_id_of_the_request(graph: Graph) -> None:
     node = RosNode(graph.own, 0, "", hashed=True)
-    node.serve("stop", lambda: (True, "stopped"))
-    node.serve("walk", lambda: (False, "the drives are idle"))
-    wait_until(lambda: len(graph.endpoints()) == 3)
-    keys = {endpoint.name: endpoint.key for endpoint in graph.endpoints() if endpoint.name}
-    types = types_of_ros()
-    for number, (name, answer) in enumerate(
-        {"stop": (True, "stopped"), "walk": (False, "the drives are idle")}.items()
-    ):
+    answers = {"stop": (True, "stopped"), "walk": (False, "the drives are idle")}
+    for name, answer in answers.items():
+        node.serve(name, lambda answer=answer: answer)  # type: ignore[misc]
+    keys, types = graph.keys(2), types_of_ros()
+    for number, (name, answer) in enumerate(answers.items()):
         (reply,) = graph.ask(keys[f"/mudskipper/{name}"], number)
         response = types.deserialize_cdr(reply.ok.payload.to_bytes(), "std_srvs/msg/Trigger_Response")
         assert (response.success, response.message) == answer
@@ -179,8 +179,7 @@ def test_a_service_that_takes_long_delays_no_other(graph: Graph) -> None:
 
     node.serve("stop", stop)
     node.serve("disarm", lambda: (True, ""))
-    wait_until(lambda: len(graph.endpoints()) == 3)
-    keys = {endpoint.name: endpoint.key for endpoint in graph.endpoints() if endpoint.name}
+    keys = graph.keys(2)
     with ThreadPoolExecutor() as calls:
         stopped = calls.submit(graph.ask, keys["/mudskipper/stop"], 1)
         assert begun.wait(LONGEST_S)
@@ -213,7 +212,6 @@ def test_nodes_that_do_not_meet_this_one_are_named_once(graph: Graph, monkeypatc
             node.watch_others()
     wait_until(lambda: any("/last" in problem for problem in said))
     assert sorted(problem.split()[0] for problem in said) == ["/last", "/other_domain", "/other_hash", "/other_type"]
-    assert len(tokens) == len(others)
 
 
 def test_a_router_that_comes_later_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
