@@ -3,22 +3,18 @@
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from command_line import exit_codes
-from command_line.main import main
-from tests.command_line.command_lines import failure, refusal
+from tests.command_line.command_lines import failure, json_of, refusal, run
 from tests.folders import SHARED_DATA
 
 pytestmark = pytest.mark.usefixtures("png_alone")
 
 LABLOGS = ("experiment", "lablogs")
 LOGS = SHARED_DATA / "flipper_in_mud"
-NAMES = ("single_12N_trial1", "single_12N_trial4")
 REPEATABILITY = {"first_cv", "later_cv", "chi", "n", "values", "bounds", "invalid"}
-measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not next to the repository")
 
 
 @pytest.fixture(autouse=True)
@@ -37,40 +33,27 @@ def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(tmp_path: Pat
     assert "'air*'" in refusal(*LABLOGS, str(tmp_path), "--air", "air*")
 
 
-def test_a_folder_without_a_readable_log_names_each_reason(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_folder_without_a_readable_log_names_each_reason(tmp_path: Path) -> None:
     (tmp_path / "pond.csv").write_text("no log")
     (tmp_path / "run.mcap").write_text("no log")
-    assert main([*LABLOGS, str(tmp_path), "--json"]) == exit_codes.UNHEALTHY
-    report = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    ended = run(*LABLOGS, str(tmp_path), "--json")
+    assert ended.returncode == exit_codes.UNHEALTHY
+    report = json.loads(ended.stdout, parse_constant=pytest.fail)
     assert [each["name"] for each in report["refused"]] == ["pond.csv", "run.mcap"]
     assert all(str(tmp_path) in each["reason"] for each in report["refused"])
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with two trials of one mud and a file that is no log."""
-    folder = tmp_path_factory.mktemp("logs")
-    for name in NAMES:
+@pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not next to the repository")
+def test_the_default_method_is_at_the_top_and_the_others_are_below_methods_with_a_page_and_figures(
+    tmp_path: Path,
+) -> None:
+    """The folder has two trials of one mud, and a file that is no log."""
+    folder, out = tmp_path / "logs", tmp_path / "out"
+    folder.mkdir()
+    for name in ("single_12N_trial1", "single_12N_trial4"):
         shutil.copy(LOGS / f"{name}.csv.gz", folder)
     (folder / "notes.csv").write_text("trial,remark\n1,rain\n")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def written(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("out") / "made"
-    command = [*LABLOGS, str(folder), "--json", "--out", str(out), "--group", "single_12N*=firm"]
-    assert main(command) == exit_codes.OK
-    return out
-
-
-@pytest.fixture
-def report(written: Path) -> Any:
-    return json.loads((written / "summary.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
-
-
-@measured
-def test_the_default_method_is_at_the_top_and_the_others_are_below_methods(report: Any) -> None:
+    report = json_of(*LABLOGS, str(folder), "--out", str(out), "--group", "single_12N*=firm")
     keys = {"groups", "separation", "left_right", "air", "sensitivity"}
     assert report["schema"] == "experiment-lablogs/1"
     assert set(report) >= keys and set(report["methods"]["paper"]) >= keys
@@ -79,9 +62,6 @@ def test_the_default_method_is_at_the_top_and_the_others_are_below_methods(repor
         assert all(set(each) >= REPEATABILITY for each in method["groups"]["firm"].values())
     assert report["groups"]["firm"]["k_s"]["n"] == 2
     assert report["groups"]["firm"]["k_s"] != report["methods"]["paper"]["groups"]["firm"]["k_s"]
-
-
-@measured
-def test_the_folder_has_a_page_and_figures(written: Path) -> None:
     figures = {"strokes.png", "scatter.png", "left_right.png", "sensitivity.png"}
-    assert {path.name for path in written.iterdir()} == {"report.html", "summary.json", *figures}
+    assert {path.name for path in out.iterdir()} == {"report.html", "summary.json", *figures}
+    assert report == json.loads((out / "summary.json").read_text(encoding="utf-8"))

@@ -4,7 +4,10 @@ import json
 import os
 import sys
 import sysconfig
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,15 @@ import pytest
 from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.install import installation, service_plan
-from command_line.install.installation import StepError, install, location_problem, perform, run_command, uninstall
+from command_line.install.installation import (
+    Find,
+    StepError,
+    install,
+    location_problem,
+    perform,
+    run_command,
+    uninstall,
+)
 from command_line.install.service_plan import (
     CONFIGURATION,
     LINKS,
@@ -39,8 +50,9 @@ REENABLED = "systemctl reenable mudskipper"  # where the unit changes, as with a
 class Machine:
     """Owns a root folder and emulates the calls of systemctl that an installation needs."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, patch: pytest.MonkeyPatch) -> None:
         self.root = root
+        self._patch = patch
         self.enabled: set[str] = set()
         self.ran: list[str] = []
         self.failing = ""
@@ -60,11 +72,27 @@ class Machine:
             self.enabled.discard(words[-1])
         return Outcome(0, "")
 
-    def install(self, dry_run: bool = False) -> int:
-        return install(dry_run=dry_run, root=self.root, run=self.run, find=str)
+    def install(self, status: int = exit_codes.OK, find: Find = str, **options: bool) -> str:
+        """Install with this exit status; return what is printed."""
+        return self._printed(partial(install, root=self.root, run=self.run, find=find, **options), status)
 
-    def uninstall(self, purge: bool = False) -> int:
-        return uninstall(purge=purge, root=self.root, run=self.run, find=str)
+    def uninstall(self, **options: bool) -> str:
+        return self._printed(partial(uninstall, root=self.root, run=self.run, find=str, **options), exit_codes.OK)
+
+    def _printed(self, act: Callable[[], int], status: int) -> str:
+        with redirect_stdout(StringIO()) as printed, redirect_stderr(printed):
+            assert act() == status
+        return printed.getvalue()
+
+    def release(self, location: str) -> None:
+        """Simulate a new version of the project in which one file has changed."""
+        texts = load_sources(PREFIX)
+        changed = texts | {location: texts[location] + "# new\n"}
+        self._patch.setattr(service_plan, "load_sources", lambda *given, **named: changed)
+
+    def plan(self) -> Plan:
+        """Plan an installation on this folder as a system that is running."""
+        return plan_installation(self.system())
 
     def system(self) -> System:
         """Return this folder as a system that is running."""
@@ -87,15 +115,8 @@ class Machine:
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Machine:
-    return Machine(tmp_path)
-
-
-def release(monkeypatch: pytest.MonkeyPatch, location: str) -> None:
-    """Simulate a new version of the project in which one file has changed."""
-    texts = load_sources(PREFIX)
-    changed = texts | {location: texts[location] + "# new\n"}
-    monkeypatch.setattr(service_plan, "load_sources", lambda *given, **named: changed)
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Machine:
+    return Machine(tmp_path, monkeypatch)
 
 
 def commands(plan: Plan) -> list[str]:
@@ -105,7 +126,7 @@ def commands(plan: Plan) -> list[str]:
 def test_all_files_are_written_readable_for_every_user_and_the_service_is_enabled(machine: Machine) -> None:
     before = os.umask(0o077)
     try:
-        assert machine.install() == exit_codes.OK
+        machine.install()
     finally:
         os.umask(before)
     for location in SOURCES:
@@ -124,44 +145,39 @@ def test_where_there_is_no_working_tree_the_files_come_from_the_environment(
     assert service_plan.source_folder() == Path(sysconfig.get_path("data")) / "share/mudskipper"
 
 
-def test_a_dry_run_shows_everything_and_the_second_time_there_is_nothing_to_do(
-    machine: Machine, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert machine.install(dry_run=True) == exit_codes.OK
-    shown = capsys.readouterr().out
+def test_a_dry_run_shows_everything_and_the_second_time_there_is_nothing_to_do(machine: Machine) -> None:
+    shown = machine.install(dry_run=True)
     assert all(str(machine.root / location) in shown for location in (*SOURCES, *LINKS, MANIFEST))
     assert "run systemd-sysusers" in shown
     assert (machine.files(), machine.ran) == ({}, [])
     machine.install()
     before, ran = machine.files(), list(machine.ran)
-    capsys.readouterr()
-    assert machine.install() == exit_codes.OK
-    assert capsys.readouterr().out == "nothing to do\n"
+    assert machine.install() == "nothing to do\n"
     assert (machine.files(), machine.ran) == (before, ran)
 
 
 @pytest.mark.parametrize(("location", "edited"), [(NETWORK, False), (NETWORK, True), (CONFIGURATION, True)])
 def test_an_upgrade_replaces_a_file_and_is_written_once_next_to_an_edited_one(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch, location: str, edited: bool
+    machine: Machine, location: str, edited: bool
 ) -> None:
     machine.install()
     before = machine.edit(location) if edited else machine.text(location)
-    steps = plan_installation(machine.system()).steps
+    steps = machine.plan().steps
     assert machine.root / location not in [step.path for step in steps if isinstance(step, WriteFile)]
-    release(monkeypatch, location)
-    assert machine.install() == exit_codes.OK
+    machine.release(location)
+    machine.install()
     newer = machine.root / f"{location}.new"
     assert (newer if edited else machine.root / location).read_text(encoding="utf-8").endswith("# new\n")
     assert newer.exists() is (machine.text(location) == before) is edited
     newer.unlink(missing_ok=True)
-    assert machine.install() == exit_codes.OK
+    machine.install()
     assert not newer.exists()
 
 
 def test_a_running_system_reloads_the_installed_files(machine: Machine) -> None:
     for name in ("net/can0", "net/lo", "misc/cpu_dma_latency"):
         (machine.root / "sys/class" / name).mkdir(parents=True)
-    assert commands(plan_installation(machine.system())) == [
+    assert commands(machine.plan()) == [
         "systemd-sysusers",
         "systemctl daemon-reload",
         "udevadm control --reload",
@@ -190,7 +206,7 @@ def test_a_second_installation_lets_the_unit_wait_for_the_configured_buses(
     assert was in text
     configuration.write_text(text.replace(was, becomes), encoding="utf-8")
     machine.ran.clear()
-    assert machine.install() == exit_codes.OK
+    machine.install()
     assert machine.ran == [REENABLED]
     lines = machine.text(UNIT).splitlines()
     for key in ("BindsTo=", "After=", "WantedBy="):
@@ -199,7 +215,8 @@ def test_a_second_installation_lets_the_unit_wait_for_the_configured_buses(
         assert found == [f"sys-subsystem-net-devices-{device}.device" for device in devices]
     assert "WantedBy=multi-user.target" in lines
     machine.ran.clear()
-    assert machine.install() == exit_codes.OK and not machine.ran
+    machine.install()
+    assert not machine.ran
 
 
 @pytest.mark.parametrize("text", ["[bus", "bus = 3", "[bus]\nleft = 1", '[bus.left]\ninterface = "socketcan"', ""])
@@ -210,57 +227,48 @@ def test_a_configuration_that_makes_no_sense_is_refused_and_can_be_removed(machi
     with pytest.raises(CommandError) as refused:
         machine.install()
     assert refused.value.status == exit_codes.CONFIGURATION and machine.files() == before
-    assert machine.uninstall() == exit_codes.OK and not (machine.root / UNIT).exists()
+    machine.uninstall()
+    assert not (machine.root / UNIT).exists()
 
 
 def test_a_system_with_networkd_keeps_its_wait_for_the_network(machine: Machine) -> None:
     machine.enabled.add("systemd-networkd")
-    assert not [line for line in commands(plan_installation(machine.system())) if "systemd-networkd" in line]
+    assert not [line for line in commands(machine.plan()) if "systemd-networkd" in line]
 
 
-def test_what_the_operator_disabled_stays_so_until_the_service_is_removed(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_the_operator_disabled_stays_so_until_the_service_is_removed(machine: Machine) -> None:
     machine.install()
     machine.enabled.clear()
     machine.edit(UNIT)
-    release(monkeypatch, NETWORK)
-    assert machine.install() == exit_codes.OK and not machine.enabled
+    machine.release(NETWORK)
+    machine.install()
+    assert not machine.enabled
     machine.uninstall()
     machine.install()
     assert machine.enabled == {"systemd-networkd", "mudskipper"}
 
 
-def test_a_service_that_runs_is_never_restarted_under_a_robot(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_service_that_runs_is_never_restarted_under_a_robot(machine: Machine) -> None:
     machine.install()
-    release(monkeypatch, UNIT)
-    plan = plan_installation(machine.system())
+    machine.release(UNIT)
+    plan = machine.plan()
     assert not [line for line in commands(plan) if "restart" in line or " start " in line]
     assert any("systemctl restart mudskipper" in note for note in plan.notes)
 
 
-def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(
-    machine: Machine, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(machine: Machine) -> None:
     machine.failing = "systemd-sysusers"
-    assert machine.install() == exit_codes.UNHEALTHY
-    said = capsys.readouterr().err
+    said = machine.install(exit_codes.UNHEALTHY)
     assert "systemd-sysusers" in said and "Failed to connect to bus" in said and "9 of 14" in said
     machine.failing = ""
-    assert machine.install() == exit_codes.OK
+    machine.install()
     assert "systemd-sysusers" in machine.ran
     assert "mudskipper" in machine.enabled
 
 
-def test_a_missing_program_is_reported_before_anything_is_written(
-    machine: Machine, capsys: pytest.CaptureFixture[str]
-) -> None:
-    found = {"systemctl": "/bin/systemctl", "udevadm": "/bin/udevadm", "networkctl": "/bin/networkctl"}
-    missing = install(root=machine.root, run=machine.run, find=found.get)
-    assert missing == exit_codes.UNHEALTHY
-    assert "systemd-sysusers: not installed" in capsys.readouterr().err
+def test_a_missing_program_is_reported_before_anything_is_written(machine: Machine) -> None:
+    found = {name: f"/bin/{name}" for name in ("systemctl", "udevadm", "networkctl")}
+    assert "systemd-sysusers: not installed" in machine.install(exit_codes.UNHEALTHY, found.get)
     assert machine.files() == {}
 
 
@@ -295,7 +303,7 @@ def test_uninstall_keeps_logs_and_what_was_edited_and_a_purge_keeps_nothing(mach
     log = "var/lib/mudskipper/logs/done/a.mcap"
     (machine.root / log).parent.mkdir(parents=True)
     (machine.root / log).write_text("a log", encoding="utf-8")
-    assert machine.uninstall() == exit_codes.OK
+    machine.uninstall()
     left = machine.files()
     assert set(json.loads(left.pop(MANIFEST))) == edited.keys() and left == edited | {log: "a log"}
     assert "mudskipper" not in machine.enabled
@@ -318,23 +326,23 @@ def test_a_purge_stops_the_service_first_and_removes_group_and_user_last(machine
 
 
 def test_the_service_for_viewers_is_loaded_again_when_it_was_deleted_or_changes_and_ended_when_it_goes(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
+    machine: Machine,
 ) -> None:
     machine.install()
     machine.enabled.add("mudskipper-live")
     assert "systemctl disable --now mudskipper-live" in commands(plan_removal(machine.system(), purge=False))
     (machine.root / LIVE_UNIT).unlink()
     loaded = ["systemctl daemon-reload", REENABLED]
-    assert commands(plan_installation(machine.system())) == loaded
+    assert commands(machine.plan()) == loaded
     machine.install()
-    release(monkeypatch, LIVE_UNIT)
-    assert commands(plan_installation(machine.system())) == loaded
+    machine.release(LIVE_UNIT)
+    assert commands(machine.plan()) == loaded
 
 
 def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None:
     machine.install()
     (machine.root / MANIFEST).write_text("[1, 2", encoding="utf-8")
-    assert machine.install() == exit_codes.OK
+    machine.install()
     assert set(json.loads(machine.text(MANIFEST))) == set(SOURCES)
 
 

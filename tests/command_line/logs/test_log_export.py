@@ -1,11 +1,9 @@
 """`mudskipper log export` to CSV and Parquet, from the command line."""
 
-import math
 import os
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -26,16 +24,6 @@ def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
     output("log", "export", "--parquet", LOG, "--out", str(folder))
     names = {path.name for path in folder.iterdir()}
     assert names == {f"walk_0_1-{part}.parquet" for part in ("ticks", "strides", "events")}
-
-
-def test_a_csv_has_seconds_from_its_beginning_turns_and_currents_with_their_sign(tmp_path: Path) -> None:
-    path, ticks = tmp_path / "walk.csv", read_log(Path(LOG)).ticks
-    output("log", "export", "--csv", LOG, "--out", str(path))
-    rows = np.genfromtxt(path, delimiter=",", skip_header=2, names=True)
-    assert rows["time"] == pytest.approx(ticks["stamp_s"] - ticks["stamp_s"][0], abs=1e-6)
-    for number, joint in enumerate(("leftsweeping", "leftadduction", "rightsweeping", "rightadduction")):
-        assert math.tau * rows[f"{joint}_pos"] == pytest.approx(ticks["angle_rad"][:, number], abs=1e-6)
-        assert rows[f"{joint}_curr"] == pytest.approx(ticks["current_a"][:, number], abs=1e-6)
 
 
 def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import pytest
 from command_line import exit_codes
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
-from logs.catalogue.catalogue import closed_logs
 from logs.files.log_reader import read_log
 from tests.command_line.command_lines import failure, json_of, output, run
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
@@ -72,7 +71,6 @@ def test_logs_are_listed_in_the_order_of_their_segments(tmp_path: Path) -> None:
     for name in reversed(names):
         (tmp_path / DONE / name).write_bytes(b"no log")
     assert [*states_in(tmp_path)] == names
-    assert [path.name for path in closed_logs(tmp_path)] == names
 
 
 def test_recovery_of_a_folder_skips_logs_that_are_being_written(folder: Path) -> None:
