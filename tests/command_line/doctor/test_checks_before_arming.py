@@ -16,25 +16,20 @@ from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPos
 from tests.waiting import LONGEST_S
 
 
-def with_pose(configuration: Configuration, pose: PoseParameters) -> Configuration:
-    return replace(configuration, pose=pose)
-
-
-def test_a_robot_without_a_pose_source_has_no_line_for_it(configuration: Configuration) -> None:
+def test_a_source_that_does_not_open_fails_and_a_robot_without_one_has_no_line_for_it(
+    configuration: Configuration,
+) -> None:
     assert examine_pose(configuration) == []
-
-
-def test_a_source_that_does_not_open_fails(configuration: Configuration) -> None:
     pytest.importorskip("serial", reason="pyserial is not installed")
     encoder = RailEncoderParameters(device="/dev/nothing", metres_per_count=1e-5)
-    (item,) = examine_pose(with_pose(configuration, PoseParameters("rail_encoder", rail_encoder=encoder)))
+    (item,) = examine_pose(replace(configuration, pose=PoseParameters("rail_encoder", rail_encoder=encoder)))
     assert item.level is Level.FAIL and "/dev/nothing" in item.text and item.fix
 
 
 def test_motion_capture_is_received(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     with NatNetServer() as server:
         natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
-        looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))
+        looked_at = replace(configuration, pose=PoseParameters("natnet", natnet=natnet))
         (item,) = examine_pose(looked_at)
         assert item.level is Level.WARN and item.fix
         ended = threading.Event()

@@ -10,11 +10,11 @@ import pytest
 from command_line import exit_codes
 from command_line.doctor.doctor import examine_all, examine_daemon
 from command_line.doctor.findings import Level
-from command_line.main import main
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
+from tests.command_line.command_lines import run
 from tests.running_bench import Bench
 
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
@@ -25,29 +25,23 @@ def synthetic_status(**changes: Any) -> dict[str, Any]:
     return {"version": "1.0", "mode": "idle", "drives": drives} | changes
 
 
-def test_without_a_daemon_every_line_is_there_and_says_what_to_do(
-    short_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = write_local_setup(short_folder, tmp_path / "logs")
-    status = main(["doctor", "--config", str(path), "--json"])
-    found = {line["id"]: line for line in json.loads(capsys.readouterr().out)}
-    assert set(found) >= LINES
-    assert {"bus.left", "load.left", "bus.right", "load.right"} <= set(found)
+def test_without_a_daemon_every_line_is_there_and_says_what_to_do(short_folder: Path, tmp_path: Path) -> None:
+    ended = run("doctor", "--config", str(write_local_setup(short_folder, tmp_path / "logs")), "--json")
+    found = {line["id"]: line for line in json.loads(ended.stdout)}
+    assert set(found) >= LINES | {"bus.left", "load.left", "bus.right", "load.right"}
     assert found["daemon"]["level"] == "warn"
     assert all(set(line) == {"id", "level", "text", "fix"} for line in found.values())
     assert all(bool(line["fix"]) is (line["level"] != "ok") for line in found.values())
     failed = any(line["level"] == "fail" for line in found.values())
-    assert status == (exit_codes.UNHEALTHY if failed else exit_codes.OK)
+    assert ended.returncode == (exit_codes.UNHEALTHY if failed else exit_codes.OK)
 
 
-def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path) -> None:
     path = tmp_path / "robot.toml"
     path.write_text("[loop]\npriority = 1000\nspeed = 3\n", encoding="utf-8")
-    assert main(["doctor", "--config", str(path)]) == exit_codes.UNHEALTHY
-    shown = capsys.readouterr().out
-    assert "FAIL configuration" in shown
-    assert "loop.priority" in shown and "loop.speed" in shown
-    assert f"-> edit {path}" in shown
+    ended = run("doctor", "--config", str(path))
+    assert ended.returncode == exit_codes.UNHEALTHY
+    assert all(word in ended.stdout for word in ("FAIL configuration", "loop.priority", "loop.speed", f"edit {path}"))
 
 
 @pytest.mark.parametrize(

@@ -116,7 +116,6 @@ def test_an_empty_tree_breaks_nothing(tmp_path: Path) -> None:
         ({ISOLATED: "4"}, {"cpu": 4}, "processors", FAIL),  # there are four
         (TWO_BUSES, {"priority": 44}, "interrupts", OK),
         (TWO_BUSES, {"priority": 45}, "interrupts", WARN),
-        (TWO_BUSES, {"priority": 60}, "interrupts", WARN),
     ],
 )
 def test_each_property_is_evaluated(
@@ -205,7 +204,6 @@ def test_logs_that_were_cut_off_are_reported_if_no_daemon_is_writing_them(comput
     [
         (0.5, 10**10, OK),
         (0.05, 10**9, WARN),  # less than is to stay free
-        (0.99, 3_000_000, FAIL),  # a small disk in memory
         (0.99, WALK_BYTES_PER_MIN * LEAST_MIN - 1, FAIL),
         (0.99, WALK_BYTES_PER_MIN * LEAST_MIN, WARN),
         (0.99, WALK_BYTES_PER_MIN * ENOUGH_MIN - 1, WARN),

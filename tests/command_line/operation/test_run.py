@@ -11,30 +11,34 @@ import msgpack
 import pytest
 
 from command_line import exit_codes
-from command_line.errors import CommandError
 from command_line.operation import attended_walk, run
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
 from firmware_host.lease import TAKEN_OVER
 from operator_client.status_client import CallRefusedError, StatusClient, plain
+from tests.command_line.command_lines import json_of, refusal
+from tests.command_line.command_lines import run as run_command
 from tests.folders import ROOT
 
 LAWS = ROOT / "examples" / "laws"
 MODE = {"fault": None, "power_cut": None, "notice": "", "stride": 0, "phase": "swing", "depth_m": 0.0, "body_x_m": 0.0}
 
 
+HELD = {"schema": "operation/1", "command": "run", "mode": "hold", "notice": ""}
+
+
 class WalkOfTwoStrides(StatusClient):
     """A daemon whose robot closes a stride of both flippers with every second status, and stops on request."""
 
-    def __init__(self, _: Path, refusal: str = "") -> None:
+    def __init__(self, _: Path) -> None:
         self.orders: list[dict[str, Any]] = []
-        self._refusal, self._asked, self._stopped = refusal, 0, False
-        self.lease_refusal = ""
+        self.refusal, self.lease_refusal = "", ""
+        self._asked, self.stopped = 0, False
 
     def call(self, method: str, /, **params: Any) -> Any:
         if method == "status":
             self._asked += 1
-            rests = self._stopped or self._asked > 8
+            rests = self.stopped or self._asked > 8
             return MODE | {"mode": "hold" if rests else "walking", "strides_closed": 10}
         if method == "strides":
             closed = 10 + 2 * min(2, self._asked // 2)
@@ -42,11 +46,11 @@ class WalkOfTwoStrides(StatusClient):
         if method == "lease" and self.lease_refusal:
             raise CallRefusedError(self.lease_refusal)
         if method == "stride":
-            if self._refusal:
-                raise CallRefusedError(self._refusal)
+            if self.refusal:
+                raise CallRefusedError(self.refusal)
             packed = msgpack.packb(params, default=plain)  # raises what the real client raises
             self.orders.append(msgpack.unpackb(packed, strict_map_key=False))
-        self._stopped = self._stopped or method == "stop"
+        self.stopped = self.stopped or method == "stop"
         return "accepted"
 
     def close(self) -> None:
@@ -64,36 +68,43 @@ class HoldingRobot(WalkOfTwoStrides):
             if not params["left_sweep_rad"] <= 1.0:
                 raise CallRefusedError("left_sweep: must be at most 1")
             self.orders.append(params)
-        self._stopped = self._stopped or method == "stop"
+        self.stopped = self.stopped or method == "stop"
         return "accepted"
 
 
-@pytest.fixture
-def holding(monkeypatch: pytest.MonkeyPatch) -> HoldingRobot:
-    client = HoldingRobot(Path())
-    monkeypatch.setattr("command_line.operation.run.StatusClient", lambda socket: client)
-    return client
+def serve(client: WalkOfTwoStrides, patch: pytest.MonkeyPatch) -> None:
+    """Let the command meet this daemon, and no time pass between two looks at it."""
+    patch.setattr(attended_walk, "POLL_S", 0.0)
+    patch.setattr(attended_walk, "RENEWAL_S", 0.0)
+    patch.setattr(run, "StatusClient", lambda socket: client)
 
 
 @pytest.fixture
 def daemon(monkeypatch: pytest.MonkeyPatch) -> WalkOfTwoStrides:
     client = WalkOfTwoStrides(Path())
-    monkeypatch.setattr(attended_walk, "POLL_S", 0.0)
-    monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    monkeypatch.setattr("command_line.operation.run.StatusClient", lambda socket: client)
+    serve(client, monkeypatch)
     return client
 
 
-def law(folder: Path, body: str) -> str:
+@pytest.fixture
+def holding(monkeypatch: pytest.MonkeyPatch) -> HoldingRobot:
+    client = HoldingRobot(Path())
+    serve(client, monkeypatch)
+    return client
+
+
+def law(folder: Path, body: str, rate_hz: str = "") -> str:
+    """Write a law, and return its file; with a rate it moves single joints."""
     path = folder / "law.py"
-    path.write_text(f"import math\ndef law(strides):\n    {body}\n", encoding="utf-8")
+    head = f"RATE_HZ = {rate_hz}\n" if rate_hz else "import math\n"
+    path.write_text(f"{head}def law(seen):\n    {body}\n", encoding="utf-8")
     return str(path)
 
 
 @pytest.mark.parametrize(
     ("body", "orders"),
     [
-        ("return 0.001 * strides[0]['number']", [{"depth_m": 0.01}, {"depth_m": 0.012}]),
+        ("return 0.001 * seen[0]['number']", [{"depth_m": 0.01}, {"depth_m": 0.012}]),
         ("return {'depth_m': 0.03, 'sweep_angle_deg': 20.0}", [{"depth_m": 0.03, "sweep_angle_deg": 20.0}] * 2),
         ("return __import__('numpy').float32(0.03125)", [{"depth_m": 0.03125}] * 2),
         ("return None", []),
@@ -103,18 +114,14 @@ def law(folder: Path, body: str) -> str:
 def test_a_law_is_called_once_for_each_stride_that_closed(
     daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
 ) -> None:
-    answer = run.run(law(tmp_path, body), socket=tmp_path)
-    assert answer.print(as_json=False) == exit_codes.OK
-    assert answer.report == {"command": "run", "mode": "hold", "notice": ""}
+    assert json_of("run", law(tmp_path, body)) == HELD
     assert daemon.orders == list(orders)
 
 
-def test_with_json_a_law_prints_to_standard_error(
-    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run.run(law(tmp_path, "print('thinking')"), socket=tmp_path, json=True).print(as_json=True)
-    printed = capsys.readouterr()
-    assert json.loads(printed.out)["mode"] == "hold" and "thinking" in printed.err
+@pytest.mark.usefixtures("daemon")
+def test_with_json_a_law_prints_to_standard_error(tmp_path: Path) -> None:
+    ended = run_command("run", law(tmp_path, "print('thinking')"), "--json")
+    assert json.loads(ended.stdout) == HELD and "thinking" in ended.stderr
 
 
 def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,6 +131,7 @@ def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.
     assert run.order_of(found, []) == {"depth_m": 0.025}
 
 
+@pytest.mark.usefixtures("daemon")
 @pytest.mark.parametrize(
     ("body", "named"),
     [
@@ -135,65 +143,50 @@ def test_a_law_imports_what_lies_next_to_it(tmp_path: Path, monkeypatch: pytest.
         ("return {'depth_m': 2**64}", ("cannot be sent",)),
     ],
 )
-def test_a_law_that_fails_stops_the_robot_and_is_named(
-    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str], body: str, named: Sequence[str]
-) -> None:
-    assert run.run(law(tmp_path, body), socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
-    printed = capsys.readouterr()
-    assert printed.out.splitlines()[-1] == "hold" and all(name in printed.err for name in named)
+def test_a_law_that_fails_stops_the_robot_and_is_named(tmp_path: Path, body: str, named: Sequence[str]) -> None:
+    ended = run_command("run", law(tmp_path, body))
+    assert ended.returncode == exit_codes.REFUSED and ended.stdout.splitlines()[-1] == "hold"
+    assert all(name in ended.stderr for name in named)
 
 
-def test_a_law_that_takes_longer_than_its_lease_is_named(
-    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("daemon")
+def test_a_law_that_takes_longer_than_its_lease_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "LEASE_S", 0.01)
-    run.run(law(tmp_path, "import time; time.sleep(0.02)"), socket=tmp_path)
-    assert capsys.readouterr().err.count(" s: a lease lasts 0.01 s") == 2  # strides
+    ended = run_command("run", law(tmp_path, "import time; time.sleep(0.02)"))
+    assert ended.stderr.count(" s: a lease lasts 0.01 s") == 2  # strides
 
 
-def test_an_order_that_the_daemon_refuses_stops_the_robot(
-    daemon: WalkOfTwoStrides, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    daemon._refusal = "depth_m = 9: too deep"
-    assert run.run(law(tmp_path, "return 9.0"), socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
-    assert daemon._refusal in capsys.readouterr().err
+def test_an_order_that_the_daemon_refuses_stops_the_robot(daemon: WalkOfTwoStrides, tmp_path: Path) -> None:
+    daemon.refusal = "depth_m = 9: too deep"
+    ended = run_command("run", law(tmp_path, "return 9.0"))
+    assert ended.returncode == exit_codes.REFUSED and daemon.refusal in ended.stderr and daemon.stopped
 
 
 def test_a_program_that_takes_the_robot_over_is_not_stopped(daemon: WalkOfTwoStrides, tmp_path: Path) -> None:
-    daemon._refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
-    with pytest.raises(CallRefusedError, match="uid 7"):
-        run.run(law(tmp_path, "return 0.02"), socket=tmp_path)
-    assert not daemon._stopped
+    daemon.refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
+    ended = run_command("run", law(tmp_path, "return 0.02"))
+    assert ended.returncode == exit_codes.REFUSED and "uid 7" in ended.stderr and not daemon.stopped
 
 
-def test_nor_by_a_law_that_fails_meanwhile(
-    daemon: WalkOfTwoStrides, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nor_by_a_law_that_fails_meanwhile(daemon: WalkOfTwoStrides, monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(strides: Any) -> None:
         daemon.lease_refusal = f"{TAKEN_OVER}uid 7 wanted the robot"
         raise ZeroDivisionError
 
     monkeypatch.setattr(run, "load_law", lambda target: (failing, 0.0))
-    with pytest.raises(CallRefusedError, match="uid 7"):
-        run.run("", socket=tmp_path)
-    assert not daemon._stopped
-
-
-def joint_law(folder: Path, body: str, rate_hz: str = "50.0") -> str:
-    path = folder / "law.py"
-    path.write_text(f"RATE_HZ = {rate_hz}\ndef law(status):\n    {body}\n", encoding="utf-8")
-    return str(path)
+    ended = run_command("run", "law.py")
+    assert ended.returncode == exit_codes.REFUSED and "uid 7" in ended.stderr and not daemon.stopped
 
 
 def test_a_law_with_a_rate_moves_joints_by_the_status_until_the_robot_holds_no_more(
     holding: HoldingRobot, tmp_path: Path
 ) -> None:
-    target = joint_law(tmp_path, "return {'left_sweep_rad': status['now_s']}")
-    assert run.run(target, socket=tmp_path).print(as_json=False) == exit_codes.REFUSED  # it is idle
+    ended = run_command("run", law(tmp_path, "return {'left_sweep_rad': seen['now_s']}", "50.0"))
+    assert ended.returncode == exit_codes.REFUSED  # it is idle
     first, *others = holding.orders
     assert first == {"left_sweep_rad": pytest.approx(0.1), "lease_s": attended_walk.LEASE_S, "take_over": False}
     assert [order["left_sweep_rad"] for order in others] == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6])
-    assert not holding._stopped
+    assert not holding.stopped
 
 
 @pytest.mark.parametrize(
@@ -201,21 +194,18 @@ def test_a_law_with_a_rate_moves_joints_by_the_status_until_the_robot_holds_no_m
     [("1 / 0", "ZeroDivisionError"), ("'up'", "'up'"), ("{'left_sweep_rad': float('nan')}", "nan")],
 )
 def test_a_law_of_joints_that_fails_stops_the_robot(
-    holding: HoldingRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str], bad: str, named: str
+    holding: HoldingRobot, tmp_path: Path, bad: str, named: str
 ) -> None:
-    target = joint_law(tmp_path, f"return {bad} if status['now_s'] > 0.25 else {{'left_sweep_rad': 0.0}}")
-    assert run.run(target, socket=tmp_path).print(as_json=False) == exit_codes.REFUSED
-    assert len(holding.orders) == 2 and holding._stopped
-    assert named in capsys.readouterr().err
+    body = f"return {bad} if seen['now_s'] > 0.25 else {{'left_sweep_rad': 0.0}}"
+    ended = run_command("run", law(tmp_path, body, "50.0"))
+    assert ended.returncode == exit_codes.REFUSED and named in ended.stderr
+    assert len(holding.orders) == 2 and holding.stopped
 
 
 @pytest.mark.parametrize("rate_hz", ["0.99", "50.01", "float('nan')", "'20'"])
 def test_a_rate_out_of_bounds_is_refused_before_the_robot_moves(tmp_path: Path, rate_hz: str) -> None:
-    with pytest.raises(CommandError, match="RATE_HZ") as refused:
-        run.run(joint_law(tmp_path, "return {}", rate_hz), socket=tmp_path)
-    assert refused.value.status == exit_codes.USAGE
-    with pytest.raises(CommandError, match="--strides"):
-        run.run(joint_law(tmp_path, "return {}"), socket=tmp_path, strides=3)
+    assert "RATE_HZ" in refusal("run", law(tmp_path, "return {}", rate_hz))
+    assert "--strides" in refusal("run", law(tmp_path, "return {}", "50.0"), "--strides", "3")
 
 
 @pytest.mark.parametrize(
@@ -225,9 +215,7 @@ def test_a_file_without_a_law_is_refused_before_the_robot_walks(tmp_path: Path, 
     path = tmp_path / "law.py"
     path.write_text(content, encoding="utf-8")
     for target in (str(path), f"{path}:absent"):
-        with pytest.raises(CommandError) as refused:
-            run.run(target, socket=tmp_path)
-        assert refused.value.status == exit_codes.USAGE
+        assert str(path) in refusal("run", target)
 
 
 @pytest.mark.parametrize("path", sorted(LAWS.glob("*.py")), ids=lambda path: path.stem)
