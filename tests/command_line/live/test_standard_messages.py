@@ -18,6 +18,7 @@ from logs.files.log_reader import Log, read_log
 from tests.folders import ROOT
 
 GEOMETRY = FlipperGeometry()
+Messages = dict[str, list[tuple[int, Any]]]  # by topic, each with its time in ns
 
 
 @pytest.fixture(scope="module")
@@ -26,11 +27,11 @@ def log() -> Log:
 
 
 @pytest.fixture(scope="module")
-def served(log: Log) -> dict[str, list[tuple[int, bytes]]]:
-    """Return the messages of a recorded walk by topic, each with its time in ns."""
+def served(log: Log) -> Messages:
+    """Return the messages of a recorded walk, as bytes."""
     standard = StandardMessages(GEOMETRY)
     coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
-    messages: dict[str, list[tuple[int, bytes]]] = {}
+    messages: Messages = {}
     for tick in log.ticks:
         while coming and coming[-1]["stamp_s"] <= tick["stamp_s"]:
             row = coming.pop()
@@ -43,9 +44,9 @@ def served(log: Log) -> dict[str, list[tuple[int, bytes]]]:
 
 
 @pytest.fixture(scope="module")
-def decoded(served: dict[str, list[tuple[int, bytes]]]) -> dict[str, list[tuple[int, Any]]]:
+def decoded(served: Messages) -> Messages:
     """Return the messages decoded by another library than that which encodes them, with the definitions served."""
-    found: dict[str, list[tuple[int, Any]]] = {}
+    found: Messages = {}
     for number, (topic, messages) in enumerate(served.items(), 1):
         definition = ROS.generate_msgdef(TOPICS[topic], ros_version=2)[0].encode()
         decode = DecoderFactory().decoder_for("cdr", Schema(number, definition, "ros2msg", TOPICS[topic]))
@@ -54,15 +55,20 @@ def decoded(served: dict[str, list[tuple[int, bytes]]]) -> dict[str, list[tuple[
     return found
 
 
-def test_ticks_have_messages_once_their_number_begins_again(log: Log) -> None:
-    standard, first = StandardMessages(GEOMETRY), log.ticks[0]
-    standard.of_tick(0, {name: first[name] for name in log.ticks.dtype.names or ()} | {"tick": 2**32 - 1})
+@pytest.fixture
+def tick(log: Log) -> dict[str, Any]:
+    first = log.ticks[0]
+    return {name: first[name] for name in log.ticks.dtype.names or ()}
+
+
+def test_ticks_have_messages_once_their_number_begins_again(tick: dict[str, Any]) -> None:
+    standard = StandardMessages(GEOMETRY)
+    standard.of_tick(0, tick | {"tick": 2**32 - 1})
     assert standard.is_due(0) and not standard.is_due(2**32 - 1)
 
 
-def test_a_body_whose_pose_is_missing_stays_where_it_was_measured_last(log: Log) -> None:
-    standard, first, positions_m = StandardMessages(GEOMETRY), log.ticks[0], []
-    tick = {name: first[name] for name in log.ticks.dtype.names or ()}
+def test_a_body_whose_pose_is_missing_stays_where_it_was_measured_last(tick: dict[str, Any]) -> None:
+    standard, positions_m = StandardMessages(GEOMETRY), []
     for body_x_m in (nan, 1.2, nan):
         messages = standard.of_tick(0, tick | {"body_x_m": body_x_m})
         assert ("/odom" in messages) == isfinite(body_x_m)
@@ -71,20 +77,16 @@ def test_a_body_whose_pose_is_missing_stays_where_it_was_measured_last(log: Log)
     assert positions_m == [0.0, 1.2, 1.2]
 
 
-def test_joints_that_were_not_heard_yet_are_left_out(log: Log) -> None:
-    first = log.ticks[0]
-    tick = {name: first[name] for name in log.ticks.dtype.names or ()}
+def test_joints_that_were_not_heard_yet_are_left_out(tick: dict[str, Any]) -> None:
     messages = StandardMessages(GEOMETRY).of_tick(0, tick | {"angle_rad": [0.1, nan, 0.3, 0.4]})
-    decoded: dict[str, Any] = {
-        topic: ROS.deserialize_cdr(content, TOPICS[topic]) for topic, content in messages.items()
-    }
+    decoded: Any = {topic: ROS.deserialize_cdr(content, TOPICS[topic]) for topic, content in messages.items()}
     state, frames = decoded["/joint_states"], decoded["/tf"].transforms
     assert state.name == ["left_sweep", "right_sweep", "right_adduction"] and state.position.tolist() == [0.1, 0.3, 0.4]
     assert [frame.child_frame_id for frame in frames] == ["base_link", "right_edge", "right_flipper"]
     assert not {"/left/pose", "/left/force"} & decoded.keys()
 
 
-def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
+def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: Messages) -> None:
     states = decoded["/joint_states"]
     assert all(tuple(state.name) == JOINTS for _, state in states)
     chosen = log.ticks[:: round(380 / MESSAGE_HZ)]
@@ -94,14 +96,14 @@ def test_joints_have_names_and_the_values_of_the_log(log: Log, decoded: dict[str
     assert state.header.stamp.sec * 10**9 + state.header.stamp.nanosec == time_ns
 
 
-def test_messages_come_at_50_to_100_hz_in_the_order_of_time(decoded: dict[str, list[tuple[int, Any]]]) -> None:
+def test_messages_come_at_50_to_100_hz_in_the_order_of_time(decoded: Messages) -> None:
     for topic in TOPICS.keys() - {"/diagnostics"}:
         times_ns = [time_ns for time_ns, _ in decoded[topic]]
         steps_s = [(after - before) / 1e9 for before, after in pairwise(times_ns)]
         assert min(steps_s) >= 0.01 and max(steps_s) <= 0.02, topic
 
 
-def test_forces_and_frames_are_those_of_the_geometry(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
+def test_forces_and_frames_are_those_of_the_geometry(log: Log, decoded: Messages) -> None:
     chosen = log.ticks[:: round(380 / MESSAGE_HZ)]
     for number, flipper in enumerate(FLIPPERS):
         forces = [message.wrench.force for _, message in decoded[f"/{flipper}/force"]]
@@ -128,7 +130,7 @@ def test_the_frame_of_a_flipper_turns_with_its_arm(flipper: str) -> None:
         assert Rotation.from_quat(pose.quaternion).apply(arm_m) == pytest.approx(pose.position_m)
 
 
-def test_diagnostics_name_mode_joints_and_mud(log: Log, decoded: dict[str, list[tuple[int, Any]]]) -> None:
+def test_diagnostics_name_mode_joints_and_mud(log: Log, decoded: Messages) -> None:
     time_ns, last = decoded["/diagnostics"][-1]
     statuses = {status.name: {item.key: item.value for item in status.values} for status in last.status}
     assert statuses.keys() == {"robot", *JOINTS, "left mud", "right mud"}

@@ -1,6 +1,5 @@
 """`mudskipper log pull` copies finished logs once, marks them, and continues; rsync is a double."""
 
-import json
 import os
 import sys
 import time
@@ -64,19 +63,23 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return logs
 
 
+def pulled(robot: Path) -> list[str]:
+    """Pull the logs, and return the names of those that are new."""
+    return [*json_of("log", "pull", f"host:{robot}", "here")["copied"]]
+
+
 def test_finished_logs_are_copied_compared_and_marked_once(robot: Path) -> None:
-    ended = run("log", "pull", f"host:{robot}", "here", "--json")
-    assert (ended.returncode, json.loads(ended.stdout)["copied"]) == (exit_codes.OK, ["1.mcap", "2.mcap", "3.mcap"])
+    assert pulled(robot) == ["1.mcap", "2.mcap", "3.mcap"]
     assert {path.name for path in (robot / "copied").iterdir()} == {"1", "2", "3"}
     (robot / "done" / "5.mcap").touch()
-    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == ["5.mcap"]
+    assert pulled(robot) == ["5.mcap"]
 
 
 def test_a_log_that_was_preserved_on_either_side_is_not_copied_again(robot: Path) -> None:
-    run("log", "pull", f"host:{robot}", "here")
+    pulled(robot)
     (robot / "done" / "1.mcap").rename(robot / "kept" / "1.mcap")
     Path("here/done/2.mcap").rename("here/kept/2.mcap")
-    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == []
+    assert pulled(robot) == []
     assert sorted(path.name for path in Path("here").rglob("*.mcap")) == ["1.mcap", "2.mcap", "3.mcap"]
 
 
@@ -85,30 +88,30 @@ def test_an_annotation_on_the_robot_reaches_the_copy_unless_that_was_annotated_t
         log.write_text(text)
         os.utime(log, (time.time() + 10.0,) * 2)
 
-    run("log", "pull", f"host:{robot}", "here")
+    pulled(robot)
     assert copies_text(robot) == "0 of 2 not copied"
     for name in "12":
         annotate(robot / "done" / f"{name}.mcap", "theirs")
     annotate(Path("here/done/2.mcap"), "mine")
     assert copies_text(robot) == "2 of 2 not copied"
-    assert json_of("log", "pull", f"host:{robot}", "here")["copied"] == ["1.mcap"]
+    assert pulled(robot) == ["1.mcap"]
     assert [Path(f"here/done/{name}.mcap").read_text() for name in "12"] == ["theirs", "mine"]
     assert copies_text(robot) == "1 of 2 not copied"
 
 
-def test_a_robot_that_is_lost_in_the_middle_costs_no_log(robot: Path) -> None:
-    ended = run("log", "pull", f"host:{robot}", "here", COPIES="1")
-    assert ended.returncode == exit_codes.UNHEALTHY and "No route to host; 1 new log copied" in ended.stderr
+@pytest.mark.parametrize(
+    ("environment", "status", "said"),
+    [
+        ({}, exit_codes.UNHEALTHY, "No route to host; 1 new log copied"),
+        ({"INTERRUPT": "1"}, exit_codes.INTERRUPTED, "stopped; 1 new log copied"),  # Ctrl-C
+    ],
+)
+def test_an_end_in_the_middle_costs_no_log(robot: Path, environment: dict[str, str], status: int, said: str) -> None:
+    words = ("log", "pull", f"host:{robot}", "here")
+    ended = run_process(*words, COPIES="1", PYTHONPATH=str(ROOT), **environment)
+    assert ended.returncode == status and said in ended.stderr
     assert not (robot / "copied").exists()
-    assert run("log", "pull", f"host:{robot}", "here").returncode == exit_codes.OK
-    assert len(list((robot / "copied").iterdir())) == 3
-
-
-def test_ctrl_c_in_the_middle_costs_no_log(robot: Path) -> None:
-    ended = run_process("log", "pull", f"host:{robot}", "here", COPIES="1", INTERRUPT="1", PYTHONPATH=str(ROOT))
-    assert ended.returncode == exit_codes.INTERRUPTED and "stopped; 1 new log copied" in ended.stderr
-    assert not (robot / "copied").exists()
-    assert run("log", "pull", f"host:{robot}", "here").returncode == exit_codes.OK
+    pulled(robot)
     assert len(list((robot / "copied").iterdir())) == 3
 
 
