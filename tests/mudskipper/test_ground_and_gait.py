@@ -6,7 +6,6 @@ from dataclasses import FrozenInstanceError
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -68,12 +67,3 @@ def test_what_no_file_may_say_is_refused_with_the_key(kind: type, tables: dict[s
 def test_a_file_that_is_missing_is_named(kind: type, tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="none.toml"):
         kind(tmp_path / "none.toml")
-
-
-def test_the_environment_walks_on_a_ground() -> None:
-    tables = {"segment": [{"start_m": 0.0, "end_m": 1000.0, "strength_pa": 900.0}]}
-    felt = []
-    for world in (Ground(strength_pa=900.0), tables):
-        with gymnasium.make("mudskipper.gym:mudskipper/MudWalk-v0", backend="direct", world=world) as walk:
-            felt.append(walk.reset(seed=1)[0].tolist())
-    assert felt[0] == felt[1]
