@@ -78,14 +78,6 @@ def test_the_stream_has_standard_messages_with_named_joints(server: ViewerServer
     assert state.header.frame_id == "base_link"
 
 
-def test_a_viewer_that_asks_for_an_unknown_channel_reads_so_and_goes_on(server: ViewerServer) -> None:
-    with viewer_of(server) as (socket, channels):
-        subscribe(socket, 99999)
-        assert "99999" in next_json(socket, "status")["message"]
-        subscribe(socket, channels["/tick"]["id"])
-        assert received(socket, server, lambda number: tick_row(42))
-
-
 def received(socket: ClientConnection, server: ViewerServer, row_of: Callable[[int], LiveRow]) -> bytes:
     """Return the content of the first data message; the subscription may take effect after a few rows."""
     for number in range(1000):
