@@ -1,6 +1,8 @@
 """`mudskipper doctor` runs without a daemon, with one, and with a wrong configuration."""
 
 import json
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,14 +10,19 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.doctor.doctor import examine_all, examine_daemon
+from command_line.doctor import doctor
+from command_line.doctor.doctor import examine_all, examine_daemon, examine_pose
 from command_line.doctor.findings import Level
 from control.records import JOINTS
-from firmware_host.configuration.configuration import Configuration
+from drivers.pose.natnet_sockets import NatNetParameters
+from drivers.pose.rail_encoder import RailEncoderParameters
+from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.configuration.loading import load_configuration
+from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.command_lines import run
 from tests.running_bench import Bench
+from tests.waiting import LONGEST_S
 
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
 
@@ -73,3 +80,39 @@ def test_a_running_daemon_reports_its_process_its_drives_and_its_limits(bench: B
     assert "of the daemon" in found["memlock"].text
     assert "realtime" not in found  # the loop has its priority, whatever a limit would permit
     assert found["socket"].level is Level.OK
+
+
+# the source of the pose, which `mudskipper check` examines when no daemon runs
+
+
+def test_a_source_that_does_not_open_fails_and_a_robot_without_one_has_no_line_for_it(
+    configuration: Configuration,
+) -> None:
+    assert examine_pose(configuration) == []
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    encoder = RailEncoderParameters(device="/dev/nothing", metres_per_count=1e-5)
+    (item,) = examine_pose(replace(configuration, pose=PoseParameters("rail_encoder", rail_encoder=encoder)))
+    assert item.level is Level.FAIL and "/dev/nothing" in item.text and item.fix
+
+
+def test_motion_capture_is_received(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
+    with NatNetServer() as server:
+        natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
+        looked_at = replace(configuration, pose=PoseParameters("natnet", natnet=natnet))
+        (item,) = examine_pose(looked_at)
+        assert item.level is Level.WARN and item.fix
+        ended = threading.Event()
+
+        def stream() -> None:
+            while not ended.is_set():
+                server.add(RecordedPose(time.monotonic(), (time.monotonic() % 1000.0 * 1e-3, 0.0, 0.0)))
+                server.step(time.monotonic())
+                time.sleep(0.005)
+
+        streaming = threading.Thread(target=stream)
+        streaming.start()
+        monkeypatch.setattr(doctor, "LISTENING_S", LONGEST_S)  # a pose ends it
+        (item,) = examine_pose(looked_at)
+        ended.set()
+        streaming.join()
+    assert item.level is Level.OK and item.text.startswith("NatNet 4.1 from 127.0.0.1: ")

@@ -8,6 +8,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.init import init
+from command_line.init.key_reference import configuration_keys, is_required
 from command_line.init.new_file import NewRobot, new_file
 from command_line.main import main
 from control.geometry import FlipperGeometry
@@ -133,3 +134,19 @@ def test_the_file_has_a_default_name(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     output("init")
     assert [path.name for path in tmp_path.iterdir()] == ["mudskipper.toml"]
+
+
+def test_every_key_has_a_meaning_and_every_number_bounds_and_a_unit() -> None:
+    keys = list(configuration_keys())
+    assert len(keys) > 130
+    wrong = {
+        f"{key.section}.{key.name}"
+        for key in keys
+        if not key.meaning or (key.kind in ("int", "float") and not (key.bounds and key.unit))
+    }
+    assert not wrong
+
+
+def test_every_default_lies_within_its_bounds() -> None:
+    bounded = [key for key in configuration_keys() if key.bounds and not is_required(key)]
+    assert all(key.bounds and key.bounds.minimum <= key.default <= key.bounds.maximum for key in bounded)

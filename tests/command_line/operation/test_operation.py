@@ -12,6 +12,8 @@ import pytest
 from command_line import exit_codes
 from command_line.operation.confirmation import RESTING, TORQUE_UNKNOWN
 from control.modes import ENERGISED, Mode
+from control.records import JOINTS
+from drivers.fault_injection.failures import Failures
 from firmware_host.configuration import socket_paths
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from logs.files.log_reader import read_log
@@ -99,6 +101,31 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     assert {"drive.left_sweep", "drive.right_adduction"} <= {
         item["id"] for item in json.loads(check.stdout) if not item["ok"] and item["fix"]
     }
+
+
+def test_a_failing_drive_stops_the_robot_and_is_shown_and_logged(own_bench: Bench) -> None:
+    bench = own_bench
+    bench.run("arm")
+    done = bench.run("fail", "left_sweep", "off", "--for", "5")
+    assert done.returncode == exit_codes.OK and "left_sweep  off" in done.stdout
+    report = bench.wait_for(lambda report: report["mode"] == "fault")
+    assert "left_sweep" in json.dumps(report["fault"])
+    assert "failing on purpose: left_sweep off" in bench.run("status").stdout
+    assert bench.run("fail", "all", "ok").stdout == "nothing fails on purpose\n"
+    bench.wait_for(lambda report: report["failing"] == [] and report["drives"][0]["angle_age_s"] < 0.1)
+    texts = [event["text"] for event in read_log(bench.stop_daemon()).events]
+    (begin,) = [text for text in texts if text.startswith("failing on purpose")]
+    assert begin.startswith("failing on purpose: left_sweep off for 5 s, asked by ")
+    assert "end of failing on purpose: left_sweep off" in texts
+
+
+def test_the_list_shows_every_component_with_its_kinds(bench: Bench) -> None:
+    listed = json.loads(bench.run("fail", "--list", "--json").stdout)
+    table = [(row["component"], row["kind"], row["does"]) for row in listed["table"]]
+    assert table == list(Failures(("left", "right")).table()) and listed["failing"] == []
+    assert listed["schema"] == "failures/1"
+    shown = bench.run("fail", "--list").stdout
+    assert {row["family"] for row in listed["table"]} <= set(shown.split()) and all(joint in shown for joint in JOINTS)
 
 
 def test_check_without_a_daemon_checks_what_it_can(short_folder: Path, tmp_path: Path, example_text: str) -> None:
