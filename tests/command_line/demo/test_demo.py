@@ -15,7 +15,6 @@ from logs.files.log_reader import read_log
 from tests.command_line.command_lines import start_process
 from tests.waiting import LONGEST_S
 
-
 WORLD = """\
 [[segment]]
 start_m = 0.0
