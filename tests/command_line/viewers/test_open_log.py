@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from command_line import exit_codes
 from command_line.viewers import open_log
-from tests.command_line.command_lines import failure, output
+from tests.command_line.command_lines import failure, output, run
 from tests.folders import ROOT
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
@@ -37,8 +38,8 @@ def test_an_installed_viewer_gets_log_and_layout(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize("viewer", ("foxglove", "plotjuggler", "rerun"))
 def test_a_missing_viewer_is_named(viewer: str, monkeypatch: pytest.MonkeyPatch, started: list[list[str]]) -> None:
     install(monkeypatch)
-    assert "install" in failure("log", "open", LOG, "--with", viewer)
-    assert not started
+    ended = run("log", "open", LOG, "--with", viewer)
+    assert ended.returncode == exit_codes.UNHEALTHY and "install" in ended.stderr and not started
 
 
 def test_a_log_that_is_being_written_needs_no_repair(tmp_path: Path) -> None:
