@@ -101,7 +101,9 @@ def graph() -> Iterator[Graph]:
 
 
 def rows(number: int) -> list[LiveRow]:
-    tick = TICK.encode_named(stamp_s=0.05 * number, tick=20 * number, body_x_m=0.7)
+    tick = TICK.encode_named(
+        stamp_s=0.05 * number, tick=20 * number, angle_rad=(0.1, 0.2, 0.3, 0.4), force_z_n=(5.0, 6.0), body_x_m=0.7
+    )
     stride = STRIDE.encode_named(stamp_s=0.05 * number, index=number, k_p=2e6)
     return [LiveRow(TICK, tick), LiveRow(STRIDE, stride)]
 
