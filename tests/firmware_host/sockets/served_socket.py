@@ -50,6 +50,13 @@ class Served(StatusSocket):
             self.serve(self.now_s)
 
 
+def stops_of(served: Served) -> list[Caller]:
+    """Return the list to which every caller of `stop` is added from now on."""
+    stopped: list[Caller] = []
+    served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
+    return stopped
+
+
 def connect(served: Served, peer: Peer = OPERATOR) -> socket.socket:
     served.coming.append(peer)
     client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

@@ -19,7 +19,7 @@ from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_file import SocketFile
 from firmware_host.sockets.status_socket import ACCEPTING_S, MOST_ACCEPTS, MOST_CLIENTS, MOST_OPERATORS
 from operator_client.status_client import StatusClient
-from tests.firmware_host.sockets.served_socket import METHODS, OPERATOR, OTHER_USER, Served, connect, is_open, serve
+from tests.firmware_host.sockets.served_socket import OPERATOR, OTHER_USER, Served, connect, is_open, serve, stops_of
 
 CONNECTORS = 3000
 STOP = msgpack.packb([0, 2, "stop", {}])
@@ -36,12 +36,6 @@ def crowd(served: Served) -> Iterator[list[socket.socket]]:
     with ExitStack() as stack:
         yield [stack.enter_context(connect(served, OTHER_USER)) for _ in range(CONNECTORS)]
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def stops_of(served: Served) -> list[Caller]:
-    stopped: list[Caller] = []
-    served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
-    return stopped
 
 
 def ticks_until_stopped(served: Served, client: socket.socket, stopped: list[Caller]) -> int:

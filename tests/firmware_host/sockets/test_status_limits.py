@@ -24,6 +24,7 @@ from tests.firmware_host.sockets.served_socket import (
     connect,
     is_open,
     serve,
+    stops_of,
     unpacked,
 )
 
@@ -33,10 +34,8 @@ STOP = msgpack.packb([0, 2, "stop", {}])
 
 def allow_every_user(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Caller]:
     """Permit `echo` to every user; returns the list of callers that stopped the robot."""
-    stopped: list[Caller] = []
     monkeypatch.setitem(SOCKET_METHODS, "echo", SOCKET_METHODS["stop"])
-    served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
-    return stopped
+    return stops_of(served)
 
 
 def flood(clients: list[socket.socket], data: bytes) -> None:

@@ -4,7 +4,6 @@ import json
 import random
 import struct
 from pathlib import Path
-from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -21,14 +20,8 @@ from firmware_host.log.schema import RowKind
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
 from logs.files.log_summary import log_summary
-from tests.firmware_host.synthetic_rows import encode_row
+from tests.firmware_host.synthetic_rows import OPENING, encode_row
 
-WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
-OPENING: dict[str, Any] = {
-    "configuration_text": "[robot]\n",
-    "metadata": {"robot": "mudskipper-1"},
-    "wall_minus_monotonic_ns": WALL_NS,
-}
 TICKS = 1000  # six chunks
 
 

@@ -5,7 +5,6 @@ import random
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +17,9 @@ from logs.files.log_reader import read_logs
 from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_log, scan_logs
 from logs.recovery import recover_log
-from tests.firmware_host.synthetic_rows import encode_row
+from tests.firmware_host.synthetic_rows import OPENING, encode_row
 
 TICKS = 3000
-OPENING: dict[str, Any] = {"configuration_text": "", "metadata": {"run_id": "run"}, "wall_minus_monotonic_ns": 0}
 
 
 def write_ticks(path: Path, numbers: list[int], segment: int = 0) -> Path:
