@@ -17,6 +17,10 @@ from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
+# At 3 cm a wide sweep needs the steepest arm: 5 cos β + 12 cos α sin β - 6.45 = 3 with β = 43.1° over ±45°.
+STEEP = {"adaptation": "max_depth_m = 0.03\nmin_depth_m = 0.02\nmax_sweep_deg = 45.0"}
+AT_BOUND = {"limits": "adduction_min_deg = -43.2"}
+
 
 def problems_of(text: str, **sections: str) -> list[str]:
     """Return the problems of the method "gait" with these lines in these sections."""
@@ -32,51 +36,40 @@ def problems_of(text: str, **sections: str) -> list[str]:
     return []
 
 
-def test_the_methods_own_sweeps_are_within_limits_and_reach(example_text: str) -> None:
-    assert problems_of(example_text) == []
+@pytest.mark.parametrize(
+    "sections", [{}, {"limits": "sweep_min_deg = -48.0", "adaptation": "max_sweep_deg = 48.0"}, STEEP | AT_BOUND]
+)
+def test_sweeps_within_limits_and_reach_are_accepted(example_text: str, sections: dict[str, str]) -> None:
+    assert problems_of(example_text, **sections) == []
 
 
 @pytest.mark.parametrize(
-    ("adaptation", "problem"),
+    ("sections", "problem"),
     [
         (
-            "min_sweep_deg = 45.0\nmax_sweep_deg = 40.0",
+            {"adaptation": "min_sweep_deg = 45.0\nmax_sweep_deg = 40.0"},
             "adaptation.gait.min_sweep_deg = 45.0: must be at most adaptation.gait.max_sweep_deg = 40.0",
         ),
-        ("swing_duration_s = 0.1", "adaptation.gait.swing_duration_s = 0.1: must be "),
-        ("max_sweep_deg = 75.0", "adaptation.gait.max_sweep_deg = 75.0: must be "),
+        ({"adaptation": "swing_duration_s = 0.1"}, "adaptation.gait.swing_duration_s = 0.1: must be "),
+        ({"adaptation": "max_sweep_deg = 75.0"}, "adaptation.gait.max_sweep_deg = 75.0: must be "),
+        (
+            {"limits": "sweep_min_deg = -48.0"},
+            "adaptation.gait.max_sweep_deg = 50.0: must be at most 48 for limits.sweep_min_deg and sweep_max_deg",
+        ),
+        (
+            {"adaptation": "min_depth_m = 0.025\nmax_sweep_deg = 60.0"},
+            f"adaptation.gait.max_sweep_deg = 60.0: reaches {FlipperGeometry().deepest_m(60.0):.4f} m,"
+            " less than adaptation.min_depth_m = 0.025",
+        ),
+        (
+            STEEP | {"limits": "adduction_min_deg = -40.0"},
+            "limits.adduction_min_deg = -40.0: must be at most -43.2 for adaptation.gait.min_sweep_deg",
+        ),
     ],
 )
-def test_impossible_gait_keys_are_refused(example_text: str, adaptation: str, problem: str) -> None:
-    assert any(problem in each for each in problems_of(example_text, adaptation=adaptation))
-
-
-def test_a_sweep_beyond_the_joints_limits_is_refused(example_text: str) -> None:
-    limits = "sweep_min_deg = -48.0"
-    assert problems_of(example_text, limits=limits) == [
-        "adaptation.gait.max_sweep_deg = 50.0: must be at most 48 for limits.sweep_min_deg and sweep_max_deg"
-    ]
-    assert problems_of(example_text, limits=limits, adaptation="max_sweep_deg = 48.0") == []
-
-
-def test_a_sweep_that_cannot_reach_the_least_depth_is_refused(example_text: str) -> None:
-    reached_m = FlipperGeometry().deepest_m(60.0)
-    assert reached_m < 0.025
-    assert problems_of(example_text, adaptation="min_depth_m = 0.025\nmax_sweep_deg = 60.0") == [
-        f"adaptation.gait.max_sweep_deg = 60.0: reaches {reached_m:.4f} m, less than adaptation.min_depth_m = 0.025"
-    ]
-
-
-def test_an_adduction_limit_that_excludes_a_possible_pose_is_refused(example_text: str) -> None:
-    """At 3 cm a wide sweep needs the steepest arm: 5 cos β + 12 cos α sin β - 6.45 = 3 with β = 43.1° over ±45°.
-
-    The bound is rounded to a value that is accepted.
-    """
-    adaptation = "max_depth_m = 0.03\nmin_depth_m = 0.02\nmax_sweep_deg = 45.0"
-    limits = "adduction_min_deg = -40.0"
-    assert problems_of(example_text, adaptation=adaptation, limits=limits) == [
-        "limits.adduction_min_deg = -40.0: must be at most -43.2 for adaptation.gait.min_sweep_deg to max_sweep_deg"
-    ]
+def test_sweeps_that_are_impossible_are_refused(example_text: str, sections: dict[str, str], problem: str) -> None:
+    (reported,) = problems_of(example_text, **sections)
+    assert reported.startswith(problem)
 
 
 def test_other_methods_ignore_the_keys_of_the_gait_method(example_text: str) -> None:
