@@ -25,8 +25,8 @@ from tests.full_disk import files_of_at_most
 WALK = ROOT / "tests/fixtures/walk_0_1.mcap"
 
 
-def make_log(folder: Path, name: str, *events: str) -> Path:
-    log = LogFile(folder / ACTIVE / name, OPENING)
+def make_log(path: Path, *events: str, **metadata: str) -> Path:
+    log = LogFile(path, OPENING | {"metadata": OPENING["metadata"] | metadata})
     log.write([*make_ticks(0, 39), *map(make_event, events)])
     return log.finish()
 
@@ -35,7 +35,8 @@ def make_log(folder: Path, name: str, *events: str) -> Path:
 def folder(tmp_path: Path) -> Path:
     (tmp_path / DONE).mkdir()
     (tmp_path / DONE / "walk.mcap").write_bytes(WALK.read_bytes())
-    make_log(tmp_path, "rest.mcap", "fault drive_silent (drives_idle): gone", "fault drive_version (none): unknown")
+    faults = "fault drive_silent (drives_idle): gone", "fault drive_version (none): unknown"
+    make_log(tmp_path / ACTIVE / "rest.mcap", *faults)
     return tmp_path
 
 
@@ -98,7 +99,7 @@ def test_a_lower_bound_counts_in_no_median(folder: Path) -> None:
 
 
 def test_a_copy_that_an_earlier_version_exported_counts_nothing(folder: Path) -> None:
-    LogFile(folder / ACTIVE / "ros.mcap", OPENING | {"metadata": {EXPORTED: "true"}}).finish()
+    make_log(folder / ACTIVE / "ros.mcap", **{EXPORTED: "true"})
     entry = updated(folder)[f"{DONE}/ros.mcap"]
     assert (entry.state, entry.duration_s) == ("export", None)
 
@@ -125,9 +126,7 @@ def test_a_log_that_moved_is_known_and_a_deleted_one_forgotten(folder: Path, rea
 
 def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
     (folder / "report").mkdir()
-    log = LogFile(folder / ACTIVE / "run-0000.mcap", OPENING | {"metadata": {"run_id": "other", "segment": "0"}})
-    log.write(make_ticks(0, 39))
-    path = log.finish()
+    path = make_log(folder / ACTIVE / "run-0000.mcap", run_id="other", segment="0")
     for name in ("run-0000.mcap", "same.mcap"):
         (folder / "report" / name).write_bytes(path.read_bytes())
     entries = updated(folder)
@@ -143,9 +142,7 @@ def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
 
 
 def test_two_logs_of_one_name_are_two_entries(folder: Path) -> None:
-    log = LogFile(folder / "walk.mcap", OPENING)
-    log.write(make_ticks(0, 39))
-    log.finish()
+    make_log(folder / "walk.mcap")
     assert {"walk.mcap", f"{DONE}/walk.mcap"} <= updated(folder).keys()
 
 
@@ -222,7 +219,7 @@ def test_a_catalogue_that_cannot_be_stored_can_be_queried(folder: Path, monkeypa
 def test_a_full_disk_leaves_the_catalogue_before(folder: Path) -> None:
     updated(folder)
     before = catalogue_path(folder).read_bytes()
-    make_log(folder, "new.mcap")
+    make_log(folder / ACTIVE / "new.mcap")
     with files_of_at_most(100), pytest.raises(OSError, match="^File too large$"):
         Catalogue(folder).update(unwatched)
     assert catalogue_path(folder).read_bytes() == before
