@@ -168,6 +168,14 @@ def test_the_first_rise_of_the_extraction_does_not_count() -> None:
     assert one(loaded(samples, springy)).k_e == one(loaded(samples, law)).k_e
 
 
+def test_a_sample_of_the_insertion_above_the_surface_that_was_found_does_not_count() -> None:
+    rows = triggered(walked(), MUD)
+    last = max(index for index, row in enumerate(rows) if row.phase is Phase.INSERTION)
+    above = rows[0].pushed(0.0, -5.0)._replace(now_s=rows[last].now_s)
+    assert above.depth_m < MUD.surface_m
+    assert one([*rows[: last + 1], above, *rows[last + 1 :]]).k_p == one(rows).k_p
+
+
 # the trigger's known bias
 
 
