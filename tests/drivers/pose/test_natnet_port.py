@@ -141,22 +141,25 @@ def test_a_body_that_is_defined_again_is_found_by_its_name(open_laboratory: Open
 
 
 def open_multicast(
-    open_laboratory: Open, poses: Sequence[RecordedPose], version: str, interface: str = "lo", **serving: Any
+    open_laboratory: Open,
+    poses: Sequence[RecordedPose],
+    version: str,
+    listening: Mapping[str, Any] = NOTHING,
+    **serving: Any,
 ) -> Laboratory:
     """Open a laboratory whose server sends to a group from the start, and answers requests as well."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind((LOOPBACK, 0))
         number = free.getsockname()[1]
-    listening = {"group": GROUP, "port": number, "interface": interface, "version": version}
-    return open_laboratory(poses, listening, target=(GROUP, number), **serving)
+    common = {"group": GROUP, "port": number, "interface": "lo", "version": version}
+    return open_laboratory(poses, {**common, **listening}, target=(GROUP, number), **serving)
 
 
 @pytest.mark.parametrize("interface", ["lo", LOOPBACK])
-def test_multicast_frames_are_heard_on_an_interface_without_an_answer_where_their_version_is_known(
+def test_multicast_frames_are_heard_on_an_interface_without_a_server_to_ask(
     open_laboratory: Open, interface: str
 ) -> None:
-    lab = open_multicast(open_laboratory, moving(0.5), "4.1", interface)
-    lab.server.answers = False
+    lab = open_multicast(open_laboratory, moving(0.5), "4.1", {"server": "", "interface": interface})
     assert len(known(lab.run(0.5))) > 100
 
 
