@@ -114,6 +114,7 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
     ("params", "said"),
     [
         ({}, "component = None: must be"),
+        ({"component": "left_knee", "kind": "ok"}, "left_knee"),
         ({"component": "all", "kind": "off"}, "no component 'all'"),
         ({"component": "log", "kind": "off", "for_s": "long"}, "must be a number"),
         ({"component": ["log"], "kind": "off"}, "component = .*: must be"),

@@ -143,6 +143,7 @@ def test_a_note_and_a_marker_have_both_clocks(idle: Robot, method: str) -> None:
         ("mark", {"text": 3}, "text"),
         ("trial_set", {"Mud": "A"}, "'Mud'"),
         ("trial_set", {"plate": 1.0}, "plate"),
+        ("trial_set", {"water": "wet"}, "water"),
         ("trial_set", {"water": "nan"}, "water"),
         ("trial_set", {name: "ü" * 900 for name in ("mud", "note")}, "3000"),
         ("walk", {"water": "101"}, "water"),
