@@ -98,8 +98,8 @@ def test_a_drive_that_does_not_go_idle_is_reported(opened_rig: TestRig, rig: Sim
 
 
 def test_checks_that_need_an_operator_are_left_out_without_one(rig: SimulatedRig) -> None:
-    readings = [(each.left_out, each.good) for each in check_hands(TestRig(rig, BenchOperator()))]
-    assert readings == [(True, True)] * len(JOINTS)
+    readings = [(each.left_out, each.good, each.value_text) for each in check_hands(TestRig(rig, BenchOperator()))]
+    assert readings == [(True, True, "left out")] * len(JOINTS)
 
 
 @pytest.mark.parametrize("index", [0, 1])

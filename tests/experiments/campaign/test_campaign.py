@@ -122,6 +122,7 @@ REFUSED = {
     "[grid]\nworld.segment.2.strength_pa = [800.0]": "there are tables 1 to 1, not 2",
     "[grid]\nworld.ridges.amplitude_m = [0.001]": "world.segment 1: water_percent, strength_pa or sand is missing",
     f"[grid]\n{MUD} = [800.0]\nconfiguration.adaptation.methd = ['paper']": "configuration.adaptation.methd: there is",
+    f"[grid]\n{MUD} = [800.0]\nrobot.drive = ['steam']": "robot.drive = 'steam': must be one of odrive",
     f"[grid]\n{MUD} = [800.0]\nrobot.flippers = [['middle']]": "robot.flippers = ['middle']: must be one of",
     f"[grid]\n{MUD} = [800.0]\nrobot.plate = ['none.csv']": "none.csv: No such file",
     f"[grid]\n{MUD} = [800.0]\nrobot.plate = ['p.csv']\n[configuration]\ngeometry = 3": "there is a value where",
