@@ -17,7 +17,8 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  its excursions is clearly smaller than the one before on the other side, and does not count. One that
                  is smaller than the one before on its own side ends the count: only its own path remains.
                  A joint that a strong motor shakes where it rests swings faster than its inertia and its stiffness
-                 allow, π √(I / k) from one side to the other, and moves little: there strong torques in turn count.
+                 allow, π √(I / k) from one side to the other, and moves little: there strong torques in turn count,
+                 while its excursions do not fade.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -55,7 +56,7 @@ AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
 STABLE_FRACTION = 0.85  # of the excursion before, which fades: a loop with 0.09 of critical damping keeps 0.75 in 40 ms
 FAST_SWING_FRACTION = 0.75  # of half a swing of a sound joint: its motor is at least 1.8 times as strong
-SHAKEN = 6  # torques in a row, each in another direction than the one before
+SHAKEN = 8  # torques in a row, each in another direction than the one before; 7 in stiff mud, thrown by a stone
 SHAKING_FRACTION = 1.0 / 3.0  # of the torque limit, and at least PRESSING_NM
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
@@ -247,8 +248,8 @@ class MotionMonitor:
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
         if self.driven_back >= NOT_YIELDED:
             found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
-        away = self.away_rad > AWAY_RAD and self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad
-        if away or self._shaken >= SHAKEN:
+        lasts = self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad
+        if lasts and (self.away_rad > AWAY_RAD or self._shaken >= SHAKEN):
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:
             return
