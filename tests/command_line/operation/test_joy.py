@@ -86,6 +86,7 @@ def test_the_lease_lasts_for_as_long_as_the_dead_man_is_held() -> None:
 def test_a_dead_man_that_is_held_from_the_start_does_nothing() -> None:
     driven = Driven()
     driven.step(HELD, steps=5)
+    driven.drive.end()
     assert not driven.connections
 
 
