@@ -249,7 +249,8 @@ class MotionMonitor:
         if self.driven_back >= NOT_YIELDED:
             found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
         lasts = self._excursion_rad >= STABLE_FRACTION * self._excursion_before_rad
-        if lasts and (self.away_rad > AWAY_RAD or self._shaken >= SHAKEN):
+        shaken = self._shaken >= SHAKEN and self._stamp_s - self._turned_s < self._shaken_s
+        if lasts and (self.away_rad > AWAY_RAD or shaken):
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:
             return

@@ -186,6 +186,8 @@ def test_a_joint_that_comes_to_rest_in_stiff_mud_is_not_shaken(kept: float, foun
         for fraction in (0.4, -0.3, -kept):
             samples.add(fraction * angle_rad, target_rad=0.0, dt_s=0.005, torque_nm=copysign(0.3, -angle_rad))
         angle_rad *= -kept
+    for _ in range(500):  # at rest, where the last excursion fades
+        samples.add(0.001, target_rad=0.0)
     assert samples.names == found
 
 
