@@ -16,9 +16,9 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
                  target, out of the mud or thrown by a stone, and comes to rest, moves as far in a few cycles. Each of
                  its excursions is clearly smaller than the one before on the other side, and does not count. One that
                  is smaller than the one before on its own side ends the count: only its own path remains.
-                 A joint that a strong motor shakes where it rests swings faster than its inertia and its stiffness
-                 allow, π √(I / k) from one side to the other, and moves little: there strong torques in turn count,
-                 while its excursions do not fade.
+                 A joint that a strong motor shakes swings faster than its inertia and its stiffness allow, π √(I / k)
+                 from one side to the other, and moves little: so strong torques in turn count, while its excursions
+                 do not fade. A recovery that rocks a joint gives such torques on purpose.
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
@@ -56,7 +56,8 @@ AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
 STABLE_FRACTION = 0.85  # of the excursion before, which fades: a loop with 0.09 of critical damping keeps 0.75 in 40 ms
 FAST_SWING_FRACTION = 0.75  # of half a swing of a sound joint: its motor is at least 1.8 times as strong
-SHAKEN = 8  # torques in a row, each in another direction than the one before; 7 in stiff mud, thrown by a stone
+SHAKEN = 8  # torques in a row, each in another direction than the one before; 4 in a quick swing, 7 when a stone
+# has thrown the joint in stiff mud
 SHAKING_FRACTION = 1.0 / 3.0  # of the torque limit, and at least PRESSING_NM
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
@@ -173,7 +174,7 @@ class MotionMonitor:
             self._rock_s = UNKNOWN
         resting = braked or target_step_rad == 0.0
         if torque_nm * self._turned_nm <= 0.0 and abs(torque_nm) >= self._shaking_nm:
-            shakes = resting and self._stamp_s - self._turned_s < self._shaken_s
+            shakes = not pulls and self._stamp_s - self._turned_s < self._shaken_s
             self._shaken = self._shaken + 1 if shakes else 1
             self._turned_nm, self._turned_s = torque_nm, self._stamp_s
         weak = -PRESSING_NM < torque_nm < PRESSING_NM and self.driven_back < PROBED

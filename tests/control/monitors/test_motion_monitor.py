@@ -157,7 +157,7 @@ def test_a_joint_that_shakes_against_its_torques_is_found_by_what_it_gains_where
 
 
 @pytest.mark.parametrize(
-    ("limit_nm", "torque_nm", "dt_s", "resting", "shaken_at"),
+    ("limit_nm", "torque_nm", "dt_s", "target", "shaken_at"),
     [
         (0.75, 0.25, 0.0166, {"target_rad": 0.0}, 8),
         (0.75, 0.25, 0.0166, {"braked": True}, 8),
@@ -168,11 +168,11 @@ def test_a_joint_that_shakes_against_its_torques_is_found_by_what_it_gains_where
     ],
 )
 def test_strong_torques_in_turn_that_are_faster_than_a_sound_joint_swings_are_found_at_the_eighth(
-    limit_nm: float, torque_nm: float, dt_s: float, resting: dict[str, Any], shaken_at: int | None
+    limit_nm: float, torque_nm: float, dt_s: float, target: dict[str, Any], shaken_at: int | None
 ) -> None:
     samples = Samples(limit_nm)
-    samples.add(**resting)
-    found = [samples.add(torque_nm=copysign(torque_nm, (-1) ** turn), dt_s=dt_s, **resting) for turn in range(12)]
+    samples.add(**target)
+    found = [samples.add(torque_nm=copysign(torque_nm, (-1) ** turn), dt_s=dt_s, **target) for turn in range(12)]
     assert [turn for turn, names in enumerate(found, 1) if names] == list(range(shaken_at or 13, 13))
     assert samples.names <= {"joint_oscillating"}
 
@@ -191,11 +191,17 @@ def test_a_joint_that_comes_to_rest_in_stiff_mud_is_not_shaken(kept: float, foun
     assert samples.names == found
 
 
-def test_a_target_that_moves_or_a_torque_that_lasts_ends_the_count_of_those_in_turn() -> None:
+def test_a_joint_that_is_shaken_on_its_path_is_found_too() -> None:
     samples = Samples()
-    for turn in range(24):
-        target_rad = 0.001 * (turn // 7)
-        assert samples.add(torque_nm=0.3 * (-1) ** turn, dt_s=0.01, target_rad=target_rad) == set()
+    found = [
+        samples.add(0.003 * turn, target_rad=0.003 * turn, torque_nm=0.3 * (-1) ** turn, dt_s=0.01)
+        for turn in range(10)
+    ]
+    assert [bool(names) for names in found] == [False] * 8 + [True] * 2  # the first sample has none before it
+
+
+def test_a_torque_that_lasts_ends_the_count_of_those_in_turn() -> None:
+    samples = Samples()
     for turn in range(24):
         assert samples.add(torque_nm=0.3 * (-1) ** (turn // 2), dt_s=0.0125, target_rad=0.0) == set()
 
