@@ -37,6 +37,11 @@ class DriveAxis(ABC):
         self.setpoints.reset()
         self._health: DriveHealth | None = None
 
+    @property
+    def may_be_on(self) -> bool:
+        """Return whether torque may be on in the drive: it reports closed loop, or what cannot be true."""
+        return self.closed_loop
+
     def begin_read(self, now_s: float) -> None:
         """Begin a read: the frames that follow arrived between the previous call and `now_s`."""
         self._read_before_s, self._read_s = self._read_s, now_s

@@ -156,14 +156,14 @@ class Drives:
     def disarm(self, now_s: float, at_once: bool = False) -> None:
         """Close the gate; commands zero torque and idle `at_once`, later every REPEAT_S.
 
-        Later it commands the drives still in closed loop, and all of them where the bus refused the last command.
+        Later it commands the drives that may still be in closed loop, and all where the bus refused the last command.
         """
         self.gate.close()
         if not at_once and now_s - self._disarmed_s < REPEAT_S:
             return
         lost_before, everyone = self._lost, at_once or self._idling_lost
         for axis in self.axes:
-            if everyone or axis.closed_loop:
+            if everyone or axis.may_be_on:
                 self._disarmed_s = now_s
                 axis.disarm()
         self._idling_lost = self._lost > lost_before

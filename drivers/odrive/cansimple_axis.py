@@ -106,6 +106,10 @@ class CanSimpleAxis(DriveAxis):
         """Return the current of an idle drive, which reports that it measures none."""
         return 0.0 if isnan(measured_a) else measured_a
 
+    @property
+    def may_be_on(self) -> bool:
+        return self.closed_loop or self.busy_state > codec.LAST_STATE
+
     def _receive_state(self, state: int, initializing: bool, now_s: float) -> None:
         """Handle the axis state of a heartbeat."""
         if now_s - self._heartbeat_stamp_s > RESTART_SILENCE_S:

@@ -54,6 +54,7 @@ class AxisState(IntEnum):
     CLOSED_LOOP = 8
 
 
+LAST_STATE = 16  # of an axis, in firmware 0.6.11
 LAST_COMMAND = 0x1F
 BROADCAST_NODE = 0x3F  # firmware from 0.6.9 on: all drives, and one that has no id yet
 FIRST_WITH_ADDRESS = (0, 6, 9)  # older firmware may take a request for the Address message for a new node id

@@ -227,15 +227,19 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
     }
 
 
-def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
+@pytest.mark.parametrize(("state", "repeated"), [(8, True), (14, False), (16, False), (17, True)])
+def test_disarming_is_repeated_for_drives_in_closed_loop_or_a_state_that_none_has_but_not_for_a_calibration(
+    bench: Bench, state: int, repeated: bool
+) -> None:
     bench.report_everything(1.0, closed_loop=False)
-    bench.heartbeat(8, joint="left_adduction")
+    bench.heartbeat(state, joint="left_adduction")
     bench.drives.read(1.0)
     for _ in range(3):
         bench.drives.disarm(1.0)
-    assert bench.sent() == {"left": [Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")], "right": []}
+    zero_and_idle = [Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")]
+    assert bench.sent() == {"left": zero_and_idle if repeated else [], "right": []}
     bench.drives.disarm(1.01 + REPEAT_S)
-    assert len(bench.sent()["left"]) == 2
+    assert bench.sent()["left"] == (zero_and_idle if repeated else [])
 
 
 def test_disarming_that_the_bus_refused_is_repeated_for_any_report_of_the_drives(bench: Bench) -> None:
