@@ -20,6 +20,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
 MOVED_S = 0.02  # drives repeat an old value now and then
+MOVED_LEAK_S = 1.0  # of that integral: a joint that has come to rest at the same angle again is sound
 LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path, nor equal angles rest
 HIT_RAD_S2 = 2000.0  # more than full torque accelerates a whole joint: its rotor is in the play of a belt, or hits
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
@@ -123,7 +124,7 @@ class EncoderMonitor:
     def _check_frozen(self, state: DriveState, gap_s: float, torque_nm: float) -> Fault | None:
         """Return a fault if the angle is frozen. The integral is signed: a velocity at rest is noise about zero."""
         self._moved_s += gap_s
-        self._moved_rad += state.velocity_rad_s * gap_s
+        self._moved_rad += state.velocity_rad_s * gap_s - self._moved_rad * gap_s / MOVED_LEAK_S
         frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._moved_rad) > MOVED_RAD and self._moved_s > MOVED_S

@@ -58,12 +58,12 @@ def noisy(velocity_rad_s: float, count: int) -> list[float]:
 @pytest.mark.parametrize(
     ("gap_s", "velocities_rad_s", "expected"),
     [
-        # 30 mrad of the velocity's path
+        # 30 mrad of the velocity's path, of which a hundredth leaks in 10 ms
         *((0.021, noisy(sign * 1.4, 2), None) for sign in (-1.0, 1.0)),
         *((0.021, noisy(sign * 1.6, 2), 1) for sign in (-1.0, 1.0)),
-        (1 / 64, [0.96] * 3, None),  # exactly
-        (0.01, noisy(0.99, 4), None),
-        (0.01, noisy(1.01, 4), 3),
+        (0.025, [1.2] * 2, None),  # exactly
+        (0.01, noisy(1.009, 4), None),
+        (0.01, noisy(1.011, 4), 3),
         # 20 ms, of a fast angle
         (0.0099, noisy(20.0, 4), 3),
         (0.0101, noisy(20.0, 3), 2),
@@ -88,6 +88,11 @@ def noisy(velocity_rad_s: float, count: int) -> list[float]:
 def test_an_angle_may_stay_up_to_its_bounds(gap_s: float, velocities_rad_s: list[float], expected: int | None) -> None:
     samples = [(number * gap_s, 0.3, velocity) for number, velocity in enumerate(velocities_rad_s)]
     assert first_stuck(found(samples)) == expected
+
+
+def test_a_joint_that_rests_again_at_the_angle_at_which_its_encoder_stood_still_is_sound() -> None:
+    names = found([(0.01 * number, 0.3, 0.05 if number < 100 else 1e-5 * number) for number in range(200)])
+    assert names[99] == "encoder_stuck" and names[180:] == [""] * 20
 
 
 def test_a_new_angle_begins_every_wait_again() -> None:
