@@ -10,7 +10,7 @@ from command_line.json_output import Answer
 from command_line.robot_options import RobotConfiguration, interface_name
 from command_line.screen import GREEN, RED, YELLOW, coloured, watched
 from control.computing.suggestion import suggestion
-from drivers.bench.search import SearchResult, expectation_problems, id_problems
+from drivers.bench.search import SearchResult, drive_problems, expectation_problems, id_problems
 from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
@@ -58,8 +58,8 @@ def _report(bus: OpenedBus, result: SearchResult, configured: Mapping[str, Drive
     expected = {joint: drive for joint, drive in configured.items() if drive.bus == bus.name}
     joints = {(drive.node_id, drive.type): joint for joint, drive in expected.items()}
     drives = [each._asdict() | {"joint": joints.get((each.node_id, each.type), "")} for each in result.found]
-    found = result.found
-    problems = [*result.drive_problems, *id_problems(found), *expectation_problems(found, expected)]
+    found = [each._replace(model_problem="") if (each.node_id, each.type) in joints else each for each in result.found]
+    problems = [*drive_problems(found), *id_problems(found), *expectation_problems(found, expected)]
     if result.error_frames:
         problems.append(
             f"{result.error_frames} error frames: two drives may send under one id, or the bit rates differ"

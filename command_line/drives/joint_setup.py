@@ -69,7 +69,6 @@ def bus_problems(bus: OpenedBus, configuration: Configuration, joints: Sequence[
     return [
         *id_problems([each for each in result.found if each.node_id in ids]),
         *expectation_problems(result.found, expected),
-        *result.drive_problems,
     ]
 
 

@@ -94,16 +94,19 @@ def _joints(named: Sequence[str], configuration: Configuration, backups: Mapping
 def _read(
     opened: Sequence[OpenedBus], configuration: Configuration, joints: Sequence[str], documents: Sequence[object]
 ) -> list[JointSetup]:
-    """Read every drive's settings. Raises CommandError where one is not the configured one, before anything else."""
+    """Read every drive's settings. Raises CommandError where one is not the configured one, or cannot be used."""
     buses = {bus.name: bus for bus in opened}
     with watched() as show:
         problems = [each for bus in opened for each in bus_problems(bus, configuration, joints, show)]
         if problems:
             nothing = "nothing was read or written: correct this first; 'mudskipper drives find' lists all"
             raise CommandError(*problems, nothing)
-        return [
+        setups = [
             read_joint(joint, buses[configuration.drive[joint].bus], configuration, documents, show) for joint in joints
         ]
+    if problems := [f"{each.joint}: {each.found.problem}" for each in setups if each.found.problem]:
+        raise CommandError(*problems, "nothing was written: correct this first")
+    return setups
 
 
 def _summary(setups: Sequence[JointSetup], written: bool) -> int:

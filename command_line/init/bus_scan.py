@@ -10,7 +10,7 @@ from command_line.drives.opened_buses import FD_RATE_KBIT_S, opened_buses
 from command_line.init.new_file import NewRobot
 from command_line.screen import watched
 from drivers.bench.drive_setup import FoundDrive
-from drivers.bench.search import id_problems
+from drivers.bench.search import drive_problems, id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.configuration.configuration import BusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -30,7 +30,7 @@ def scan(robot: NewRobot, carries_fd: bool, drive_type: str | None) -> Found:
     problems = [
         f"{channel}: {text}"
         for channel, result in results.items()
-        for text in (*id_problems(result.found), *result.drive_problems)
+        for text in (*id_problems(result.found), *drive_problems(result.found))
     ]
     types = sorted({each.type for result in results.values() for each in result.found})
     if len(types) > 1:

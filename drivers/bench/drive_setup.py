@@ -27,6 +27,7 @@ class FoundDrive(NamedTuple):
     serial_number: str = ""
     problem: str = ""  # why this program cannot use it as it is
     model: str = ""  # of the motor, as the configuration names it: one whose ranges the drive has
+    model_problem: str = ""  # why no model has its ranges; the configuration may state them
 
 
 class CannotReadError(Exception):

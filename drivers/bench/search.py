@@ -25,11 +25,6 @@ class SearchResult(NamedTuple):
     error_frames: int  # on the bus meanwhile
     send_problem: str = ""
 
-    @property
-    def drive_problems(self) -> list[str]:
-        """What the drives say against their use."""
-        return [f"id {each.node_id} ({each.type}): {each.problem}" for each in self.found if each.problem]
-
 
 def search(
     port: BenchPort,
@@ -60,6 +55,13 @@ def _why_not_asked(bench: DriveBench, carries_fd: bool, others: Sequence[FoundDr
     if others and bench.disturbs:
         return f"{bench.disturbs}, and a drive of type {others[0].type} answers"
     return ""
+
+
+def drive_problems(found: Sequence[FoundDrive]) -> Iterator[str]:
+    """Yield what the drives say against their use."""
+    for each in found:
+        if problem := each.problem or each.model_problem:
+            yield f"id {each.node_id} ({each.type}): {problem}"
 
 
 def id_problems(found: Sequence[FoundDrive]) -> Iterator[str]:

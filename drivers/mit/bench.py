@@ -27,6 +27,7 @@ ROBSTRIDE, UNKNOWN = "a RobStride", "a CubeMars, or firmware without registers"
 OTHER_REPORT = 0x29  # in the upper bits of an extended id, above the drive's: a CubeMars that speaks another protocol
 OTHER_HARDWARE = "a CubeMars V3, or one in servo mode"
 OTHER_PROBLEM = "it reports by extended ids (0x29xx), another protocol, which is not supported: see docs/how-to/mit.md"
+OTHER_RANGES = "its ranges PMAX, VMAX and TMAX are those of no model in docs/how-to/mit.md"
 Values = dict[int, set[float]]  # of one id by register: two values where two drives answer
 
 
@@ -91,9 +92,8 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
         return
     models = models_of({register: min(found) for register, found in values.items()})
     firmware = ", ".join(f"{each:.0f}" for each in sorted(values.get(SOFTWARE, ())))
-    problem = "" if models else "its ranges PMAX, VMAX and TMAX are those of no model in docs/how-to/mit.md"
-    if any(each != node_id + 16 for each in ids):
-        problem = f"it answers under id {min(ids)}: set MST_ID (register 7) to {node_id + 16}"
+    other = min((each for each in ids if each != node_id + 16), default=None)
+    needed = f"set MST_ID (register 7) to {node_id + 16}, as 'mudskipper drives setup --write' does"
     numbers = [f"{int(each):08x}" for each in sorted(values.get(SERIAL, ()))] or [""]
     for number in numbers if len(numbers) > 1 else numbers * len(ids):
         yield FoundDrive(
@@ -102,6 +102,7 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
             hardware=" or ".join(models),
             firmware=firmware,
             serial_number=number,
-            problem=problem,
+            problem="" if other is None else f"it answers under id {other}: {needed}",
             model=next(iter(models), ""),
+            model_problem="" if models else OTHER_RANGES,
         )

@@ -11,6 +11,7 @@ import pytest
 from command_line import exit_codes
 from command_line.drives.backup_file import write_backup
 from drivers.can.bus_lock import BusRole
+from drivers.mit.setup import MST_ID
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import load_configuration
 from tests.command_line.drives.bench_setup import MakeBench
@@ -42,6 +43,25 @@ def test_different_settings_are_written_backed_up_and_restored(make_unset: MakeB
     assert restored.returncode == exit_codes.OK and "left_sweep: it has the restored settings" in restored.stdout
     assert "left_sweep had the new settings" in restored.stdout and "has the new" not in restored.stdout
     assert "left_sweep has the old settings" in bench.run("setup", "--backup", "old.toml").stdout
+
+
+def test_a_damiao_with_a_range_of_its_own_is_set_up_again_and_restored(make_bench: MakeBench) -> None:
+    """Its ranges are those of no model then, which only the configuration explains."""
+    bench = make_bench("mit")
+    bench.change("[drive.left_sweep]", "[drive.left_sweep]\ntorque_range_nm = 2.0")
+    for arguments in (("--write", "--backup", "old.toml"), (), ("--restore", "old.toml")):
+        assert bench.run("setup", *arguments).returncode == exit_codes.OK
+        assert bench.run("find").returncode == exit_codes.OK
+    assert bench.run("setup").stdout.count("differs") == 1
+
+
+def test_a_damiao_as_delivered_gets_the_id_of_its_answers(make_bench: MakeBench) -> None:
+    bench = make_bench("mit")
+    for drive in bench.drives.values():
+        drive._feedback_id = drive.registers[MST_ID] = 0  # type: ignore[attr-defined]
+    assert "MST_ID" in bench.run("find").stdout
+    written = bench.run("setup", "--write", "--backup", "old.toml")
+    assert written.returncode == exit_codes.OK and written.stdout.count("it has the new settings") == 4
 
 
 def test_one_joint_alone_is_changed(make_unset: MakeBench) -> None:

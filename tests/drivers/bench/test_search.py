@@ -67,7 +67,7 @@ def test_a_cubemars_that_reports_by_extended_ids_is_named_as_unsupported() -> No
 
 def test_ranges_of_no_model_are_a_problem() -> None:
     (drive,) = found(simulated("mit", 1, torque_range_nm=3.3))
-    assert drive.hardware == "" and "TMAX" in drive.problem
+    assert drive.hardware == "" and "TMAX" in drive.model_problem
 
 
 def test_firmware_0_5_is_found_by_its_heartbeat_and_the_counts_of_its_encoder() -> None:
