@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
-from command_line.shared_options import DEFAULT_CONFIG
+from command_line.doctor.host_facts import service_configuration
 from drivers.can.can_port import interface_problem
 from experiments.study.option import Option, OptionError
 from operator_client.default_paths import service_or_simulated
@@ -11,7 +11,7 @@ from operator_client.default_paths import service_or_simulated
 
 def default_configuration() -> Path:
     """Return the daemon's configuration; where there is none, that of `mudskipper simulate`."""
-    return Path(service_or_simulated(DEFAULT_CONFIG))
+    return Path(service_or_simulated(str(service_configuration(Path("/")))))
 
 
 def interface_name(text: str) -> str:

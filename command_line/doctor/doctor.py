@@ -35,13 +35,13 @@ from command_line.doctor.host_facts import (
     clock_is_synchronised,
     has_clock_chip,
     process_limits,
-    read_text,
+    service_configuration,
     thread_priority,
     unit_limits,
+    unit_text,
 )
 from command_line.json_output import Answer
 from command_line.screen import MARKS, coloured
-from command_line.shared_options import DEFAULT_CONFIG
 from control.records import DriveStates
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
@@ -80,7 +80,7 @@ def _given_socket() -> Path | None:
 
 def doctor(
     *,
-    config: Annotated[Path, Option("of the daemon")] = Path(DEFAULT_CONFIG),
+    config: Annotated[Path | None, Option("of the daemon (default: that of the service)")] = None,
     socket: Annotated[
         Path | None,
         Option(
@@ -105,8 +105,9 @@ def _line(finding: Finding) -> str:
     return f"{coloured(*MARKS[finding.level])} {finding.id:22} {finding.text}{fix}"
 
 
-def examine_configuration(path: Path) -> tuple[Configuration | None, list[Finding]]:
+def examine_configuration(given: Path | None) -> tuple[Configuration | None, list[Finding]]:
     """Return the configuration, None where it is wrong, with the findings about its file."""
+    path = given or service_configuration(ROOT)
     try:
         return load_configuration(path), [ok("configuration", str(path))]
     except ConfigurationError as problem:
@@ -123,7 +124,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     if service:
         yield from examine_shell(configuration.loop, shell)
     yield from examine_buses(configuration, links)
-    yield from examine_unit(read_text(ROOT / UNIT), links, [bus.channel for bus in configuration.bus.values()])
+    yield from examine_unit(unit_text(ROOT), links, [bus.channel for bus in configuration.bus.values()])
     yield from examine_storage(ROOT, configuration.log, _log_writer(), pid is not None)
     yield _examine_clock()
     yield from daemon
@@ -208,7 +209,7 @@ def _group_name(gid: int) -> str:
     return str(gid)
 
 
-def check_without_daemon(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
+def check_without_daemon(path: Path | None, why_no_daemon: str) -> list[dict[str, Any]]:
     """Return the lines of `mudskipper check`. It listens whether the drives are heard, and transmits nothing."""
     fix = "start it ('systemctl start mudskipper'), name its socket with --socket, or join the group that owns it"
     configuration, findings = examine_configuration(path)

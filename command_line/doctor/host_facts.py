@@ -21,6 +21,7 @@ RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted after the name in brack
 LIMIT_LINES = ("Max realtime priority", "Max locked memory")  # in /proc/PID/limits
 UNITS = " KMGTPE"  # of a limit: powers of 1024
 UNIT = "etc/systemd/system/mudskipper.service"
+CONFIGURATION = "etc/mudskipper/mudskipper.toml"
 
 
 class Limits(NamedTuple):
@@ -62,11 +63,21 @@ def process_limits(root: Path, pid: int | None) -> Limits | None:
 
 def unit_limits(root: Path) -> Limits | None:
     """Return the limits that the installed service, with its drop-ins, gives its daemon."""
-    files = [root / UNIT, *sorted((root / f"{UNIT}.d").glob("*.conf"))]
-    settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", "\n".join(map(read_text, files)), re.MULTILINE))
+    settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", unit_text(root), re.MULTILINE))
     if not settings:
         return None
     return Limits(_limit(settings.get("LimitRTPRIO", "0")), _limit(settings.get("LimitMEMLOCK", "0")), "in the unit")
+
+
+def unit_text(root: Path) -> str:
+    """Return the text of the installed service's unit with its drop-ins."""
+    return "\n".join(map(read_text, [root / UNIT, *sorted((root / f"{UNIT}.d").glob("*.conf"))]))
+
+
+def service_configuration(root: Path) -> Path:
+    """Return the file that the installed service reads, which a drop-in may change."""
+    named = re.findall(r"^ExecStart=.*--config[ =]/?(\S+)", unit_text(root), re.MULTILINE)
+    return root / (named[-1] if named else CONFIGURATION)
 
 
 def _limit(text: str) -> float:

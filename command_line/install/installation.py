@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from command_line import exit_codes
+from command_line.doctor.host_facts import CONFIGURATION, service_configuration
 from command_line.install.service_plan import (
-    CONFIGURATION,
     Command,
     MakeLink,
     Outcome,
@@ -95,7 +95,7 @@ def install(
     if refusal:
         complain(refusal)
         return exit_codes.REFUSED
-    require_interfaces(system.root / CONFIGURATION)
+    require_interfaces(service_configuration(system.root))
     plan = plan_installation(system)
     status = _carry_out(plan, system, dry_run, find)
     is_new = any(isinstance(step, WriteFile) and step.path == system.root / CONFIGURATION for step in plan.steps)

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line import exit_codes
+from command_line.doctor.host_facts import CONFIGURATION, UNIT, service_configuration
 from command_line.errors import CommandError
 from firmware_host.sockets.user_groups import VIEWERS
 
@@ -36,9 +37,7 @@ SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"
 RULES = "etc/udev/rules.d/70-mudskipper-cpu.rules"
 NETWORK = "etc/systemd/network/80-can.network"
-UNIT = "etc/systemd/system/mudskipper.service"
 LIVE_UNIT = "etc/systemd/system/mudskipper-live.service"  # not enabled by the installation
-CONFIGURATION = "etc/mudskipper/mudskipper.toml"
 SOURCES = {  # name in systemd/ by installed path
     SYSUSERS: "mudskipper.sysusers",
     **{path: path.rpartition("/")[2] for path in (RULES, LINK_FILE, NETWORK, UNIT, LIVE_UNIT, CONFIGURATION)},
@@ -154,7 +153,7 @@ def _bound_to(interfaces: Sequence[str], unit: str) -> str:
 
 def plan_installation(system: System, folder: Path | None = None) -> Plan:
     """Plan with the files of this version, or of one in another folder."""
-    configuration = _text_of(system.root / CONFIGURATION)
+    configuration = _text_of(service_configuration(system.root))
     sources, before = load_sources(system.prefix, folder, configuration), _load_manifest(system.root)
     after = {path: _digest(text) for path, text in sources.items()}
     plan = Plan([], [])
@@ -233,7 +232,7 @@ def plan_removal(system: System, purge: bool) -> Plan:
         if system.is_enabled(service) or (system.live and system.run(query).text.strip() == "active"):
             now = ("--now",) if system.live else ()
             plan.steps.append(system.command("systemctl", "disable", *now, service))
-    for path, text in load_sources(system.prefix, configuration=_text_of(root / CONFIGURATION)).items():
+    for path, text in load_sources(system.prefix, configuration=_text_of(service_configuration(root))).items():
         _plan_removal_of(plan, root / path, {_digest(text), before.get(path)}, purge)
     for link in LINKS:
         if (root / link).is_symlink() and (root / link).readlink() == _target(system, link):

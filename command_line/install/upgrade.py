@@ -13,11 +13,11 @@ from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from command_line import exit_codes
+from command_line.doctor.host_facts import service_configuration
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
 from command_line.install.installation import run_command
 from command_line.install.service_plan import (
-    CONFIGURATION,
     DEFAULT_PREFIX,
     MANIFEST,
     Run,
@@ -70,7 +70,7 @@ def upgrade(
 
 def _describe(environment: Path, root: Path, run: Run) -> list[str]:
     """Print what the version in this environment changes; return why it does not accept the configuration."""
-    python, configuration = str(environment / "bin" / "python"), root / CONFIGURATION
+    python, configuration = str(environment / "bin" / "python"), service_configuration(root)
     for line in key_changes(
         [f"{key.section}.{key.name}" for key in configuration_keys()],
         _output(run, python, "-I", "-c", PRINT_KEYS).splitlines(),

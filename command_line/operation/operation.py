@@ -15,7 +15,7 @@ from command_line.operation.attended_walk import attend
 from command_line.operation.mode_output import mode_answer
 from command_line.robot_text import MILD, Report
 from command_line.screen import MARKS, coloured, complain
-from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
+from command_line.shared_options import Json, Socket
 from control.computing.suggestion import suggestion
 from control.records import JOINTS
 from drivers.can.run_folder import find_run_folder
@@ -221,7 +221,7 @@ def _poll(client: StatusClient, done: Callable[[Report], bool], longest_s: float
 def check(
     *,
     socket: Socket,
-    config: Annotated[Path, Option("used without a daemon")] = Path(DEFAULT_CONFIG),
+    config: Annotated[Path | None, Option("used without a daemon (default: that of the service)")] = None,
 ) -> Answer:
     """Ask the daemon; where none runs, check what it would need."""
     try:

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.doctor.host_facts import CONFIGURATION, UNIT
 from command_line.errors import CommandError
 from command_line.install import installation, service_plan
 from command_line.install.installation import (
@@ -25,13 +26,11 @@ from command_line.install.installation import (
     uninstall,
 )
 from command_line.install.service_plan import (
-    CONFIGURATION,
     LINKS,
     LIVE_UNIT,
     MANIFEST,
     NETWORK,
     SOURCES,
-    UNIT,
     Command,
     Outcome,
     Plan,
@@ -215,6 +214,18 @@ def test_a_second_installation_lets_the_unit_wait_for_the_configured_buses(
     machine.ran.clear()
     machine.install()
     assert not machine.ran
+
+
+def test_the_unit_waits_for_the_buses_of_the_file_that_its_drop_in_names(machine: Machine) -> None:
+    machine.install()
+    text = machine.text(CONFIGURATION).replace('"can1"', '"can7"')
+    (machine.root / "etc/mudskipper/other.toml").write_text(text, encoding="utf-8")
+    (drop_in := machine.root / f"{UNIT}.d/override.conf").parent.mkdir()
+    drop_in.write_text("[Service]\nExecStart=\nExecStart=/x --config=/etc/mudskipper/other.toml\n", encoding="utf-8")
+    machine.install()
+    assert "can7.device" in machine.text(UNIT) and "can1.device" not in machine.text(UNIT)
+    machine.uninstall()
+    assert not (machine.root / UNIT).exists()
 
 
 @pytest.mark.parametrize("text", ["[bus", "bus = 3", "[bus]\nleft = 1", '[bus.left]\ninterface = "socketcan"', ""])

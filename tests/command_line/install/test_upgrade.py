@@ -12,15 +12,14 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
+from command_line.doctor.host_facts import CONFIGURATION, UNIT
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
 from command_line.install import installation
 from command_line.install import upgrade as upgrade_module
 from command_line.install.service_plan import (
-    CONFIGURATION,
     DEFAULT_PREFIX,
     LIVE_UNIT,
-    UNIT,
     Outcome,
     load_sources,
     source_folder,
@@ -131,6 +130,17 @@ def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Comput
     with pytest.raises(CommandError, match="silence_s") as refused:
         computer.upgrade()
     assert refused.value.status == exit_codes.CONFIGURATION and not computer.installed
+
+
+def test_the_configuration_is_that_of_the_service_s_drop_in(computer: Computer) -> None:
+    other = computer.root / "etc/mudskipper/two_buses.toml"
+    other.write_text((computer.root / CONFIGURATION).read_text(encoding="utf-8"), encoding="utf-8")
+    (drop_in := computer.root / f"{UNIT}.d/override.conf").parent.mkdir()
+    drop_in.write_text(
+        "[Service]\nExecStart=\nExecStart=/x --config /etc/mudskipper/two_buses.toml\n", encoding="utf-8"
+    )
+    assert computer.upgrade(check=True) == exit_codes.OK
+    assert computer.commands[-1].endswith(f"--config {other}")
 
 
 def test_a_computer_without_a_configuration_has_none_to_refuse(computer: Computer) -> None:
