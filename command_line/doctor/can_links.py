@@ -14,7 +14,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from command_line.doctor.findings import Finding, Level, fail, ok, ok_if
+from command_line.doctor.findings import Finding, Level, fail, ok, ok_if, warn
 from command_line.doctor.host_facts import UNIT
 from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
 from drivers.can.can_fd import FD_MTU, carries_fd
@@ -100,14 +100,18 @@ def examine_buses(configuration: Configuration, links: dict[str, CanLink]) -> It
         yield from examine_bus(name, bus, drives, links)
 
 
-def examine_unit(unit: str, present: Collection[str], configured: Collection[str]) -> Iterator[Finding]:
-    """Find the interfaces without which the service, by the text of its unit, does not start, and that no bus needs."""
-    bound = " ".join(re.findall(r"^BindsTo=(.*)$", unit, re.MULTILINE))
-    for name in re.findall(r"sys-subsystem-net-devices-(\S+)\.device", bound.replace(r"\x2d", "-")):
-        if name not in (*present, *configured):
-            own = "in a unit of your own edit BindsTo=, After= and WantedBy=, then 'systemctl reenable mudskipper'"
-            fix = f"'mudskipper install' again writes /{UNIT} for your buses; {own}"
-            yield fail("unit", f"the service does not start without {name}, which no bus uses", fix)
+def examine_unit(unit: str, present: Collection[str], configuration: Configuration) -> Iterator[Finding]:
+    """Compare the interfaces that the service, by the text of its unit, waits for with those that its buses need."""
+    waits, buses = not configuration.loop.wait_for_bus, configuration.bus.values()
+    needed = {bus.channel for bus in buses if waits and bus.interface == "socketcan"}
+    text = " ".join(re.findall(r"^BindsTo=(.*)$", unit, re.MULTILINE)).replace(r"\x2d", "-")
+    bound = set(re.findall(r"sys-subsystem-net-devices-(\S+)\.device", text))
+    own = "in a unit of your own edit BindsTo=, After= and WantedBy=, then 'systemctl reenable mudskipper'"
+    fix = f"'mudskipper install' again writes /{UNIT} for your buses; {own}"
+    for name in sorted(bound - needed - set(present)):
+        yield fail("unit", f"the service does not start without {name}, which no bus needs", fix)
+    for name in sorted(needed - bound) if unit else ():
+        yield warn("unit", f"the service does not wait for {name}: at a boot it may give up before that is there", fix)
 
 
 def examine_bus(

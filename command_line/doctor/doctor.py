@@ -124,7 +124,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     if service:
         yield from examine_shell(configuration.loop, shell)
     yield from examine_buses(configuration, links)
-    yield from examine_unit(unit_text(ROOT), links, [bus.channel for bus in configuration.bus.values()])
+    yield from examine_unit(unit_text(ROOT), links, configuration)
     yield from examine_storage(ROOT, configuration.log, _log_writer(), pid is not None)
     yield _examine_clock()
     yield from daemon

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from command_line.doctor import can_links
 from command_line.doctor.can_links import CanLink, examine_bus, examine_unit, parse_links, read_sys_links
 from command_line.doctor.findings import Level
 from drivers.drive import DriveParameters
-from firmware_host.configuration.configuration import BusParameters
+from firmware_host.configuration.configuration import BusParameters, Configuration
 from tests.folders import ROOT
 
 # iproute2 6.1 of Debian 12, with an mcp251xfd that is set up by systemd/80-can.network and .link.
@@ -133,18 +134,25 @@ def test_without_iproute2_the_kernel_s_files_tell(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.parametrize(
-    ("present", "configured", "found"),
+    ("present", "configured", "loop", "levels"),
     [
-        (("can0", "can1"), ("can0",), 0),  # an interface that no drive uses
-        (("can0",), ("can0",), 1),
-        ((), ("can0", "can1"), 0),  # their buses are reported
-        ((), ("/dev/ttyUSB0",), 2),
+        (("can0", "can1"), ("can0",), {}, []),  # an interface that no drive uses
+        (("can0",), ("can0",), {}, [Level.FAIL]),
+        ((), ("can0", "can1"), {}, []),  # their buses are reported
+        ((), ("/dev/ttyUSB0",), {}, [Level.FAIL] * 2),
+        (("can0", "can1", "can2"), ("can0", "can2"), {}, [Level.WARN]),
+        (("can0",), ("can0", "can1"), {"wait_for_bus": True}, [Level.FAIL]),
     ],
 )
-def test_the_service_waits_for_no_interface_that_the_robot_lacks(
-    present: tuple[str, ...], configured: tuple[str, ...], found: int
+def test_the_service_waits_for_the_interfaces_of_its_buses(
+    configuration: Configuration,
+    present: tuple[str, ...],
+    configured: tuple[str, ...],
+    loop: dict[str, bool],
+    levels: list[Level],
 ) -> None:
+    buses = {each: BusParameters("slcan" if "tty" in each else "socketcan", each) for each in configured}
+    robot = replace(configuration, bus=buses, loop=replace(configuration.loop, **loop))
     unit = (ROOT / "systemd/mudskipper.service").read_text(encoding="utf-8")
-    findings = list(examine_unit(unit, present, configured))
-    assert [finding.level for finding in findings] == [Level.FAIL] * found
-    assert not list(examine_unit("", present, configured))
+    assert [finding.level for finding in examine_unit(unit, present, robot)] == levels
+    assert not list(examine_unit("", present, robot))
