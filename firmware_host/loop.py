@@ -313,8 +313,8 @@ class Loop:
         self.controller.move([angles_rad.get(joint) for joint in self.configuration.rig.joints], speed_rad_s)
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:
-        if self.ending and request in (Request.ARM, Request.WALK):
-            return "the daemon is ending"
+        if request in (Request.ARM, Request.WALK) and (self.ending or self.pending_request is Request.DISARM):
+            return "the daemon is ending" if self.ending else "a disarm was requested just before; 'mudskipper arm' first"
         if forced and not set(forced.split(",")) <= set(OVERRULED_BY_FORCE):
             return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
         gait = (order and order.gait) or self.configuration.gait

@@ -330,6 +330,15 @@ def test_a_disarmed_request_by_force_leaves_no_trace(unfit: Robot) -> None:
     assert mode_of(unfit) is Mode.IDLE
 
 
+@pytest.mark.parametrize(("stage", "order"), [("idle", Request.ARM), ("holding", Request.WALK)])
+def test_nothing_that_a_disarm_of_the_same_tick_drops_is_accepted(at: Copied, stage: str, order: Request) -> None:
+    robot = at(stage)
+    assert robot.loop.request(Request.DISARM, robot.now_s) is None
+    assert "disarm" in (robot.loop.request(order, robot.now_s) or "")
+    robot.step()
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+
+
 def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
     robot = at("idle")
     assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
