@@ -314,7 +314,9 @@ class Loop:
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:
         if request in (Request.ARM, Request.WALK) and (self.ending or self.pending_request is Request.DISARM):
-            return "the daemon is ending" if self.ending else "a disarm was requested just before; 'mudskipper arm' first"
+            return (
+                "the daemon is ending" if self.ending else "a disarm was requested just before; 'mudskipper arm' first"
+            )
         if forced and not set(forced.split(",")) <= set(OVERRULED_BY_FORCE):
             return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
         gait = (order and order.gait) or self.configuration.gait

@@ -149,7 +149,8 @@ def _write(setups: Sequence[JointSetup], changes: Changes, names: Names) -> int:
             mark = coloured("ok  ", GREEN) if change.outcome is Outcome.NEW else coloured("FAIL", RED)
             print(f"{mark} {each.joint}: {change.text}", flush=True)
             if change.outcome is not Outcome.NEW or interrupted():
-                print("the drives after it were not changed")
+                if any(after.joint in changes for after in setups[done + 1 :]):
+                    print("the drives after it were not changed")
                 return exit_codes.INTERRUPTED if interrupted() else exit_codes.UNHEALTHY
     return exit_codes.OK
 

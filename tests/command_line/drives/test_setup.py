@@ -99,13 +99,17 @@ def test_ctrl_c_leaves_the_old_settings_and_says_so(make_unset: MakeBench) -> No
     assert "left_sweep has the old settings" in bench.run("setup", "--backup", "old.toml").stdout
 
 
-def test_a_cable_that_comes_out_is_reported_with_what_the_drive_has(make_unset: MakeBench) -> None:
+@pytest.mark.parametrize("joints", [(), ("left_sweep",)])
+def test_a_cable_that_comes_out_is_reported_with_what_the_drive_has(
+    make_unset: MakeBench, joints: tuple[str, ...]
+) -> None:
     bench = make_unset()
-    bench.run("setup")
+    bench.run("setup", *joints)
     bench.buses["left"].unplugged_after = 2 * len(bench.buses["left"].sent) + 2
-    ended = bench.run("setup", "--write", "--backup", "old.toml")
+    ended = bench.run("setup", *joints, "--write", "--backup", "old.toml")
     assert ended.returncode == exit_codes.UNHEALTHY
     assert "nothing was stored, so it has the old settings once its supply was switched off and on" in ended.stdout
+    assert ("after it were not changed" in ended.stdout) is not bool(joints)
 
 
 def test_two_drives_with_one_id_are_refused(make_unset: MakeBench) -> None:
