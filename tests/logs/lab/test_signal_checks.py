@@ -10,8 +10,9 @@ import pytest
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_error import LogError
 from logs.lab.findings import FindingKind
+from logs.lab.lab_csv import read_lab_csv
 from logs.replay import replay_files
-from tests.lab_logs import JOINTS, Change, Columns, lab_columns, read_columns, write_lab_log
+from tests.lab_logs import JOINTS, SETTINGS, Change, Columns, lab_columns, read_columns, write_lab_log
 
 
 def scaled(factor: float, part: str = "") -> Change:
@@ -166,6 +167,18 @@ def test_a_depth_beyond_the_command_is_reported(tmp_path: Path) -> None:
     findings = read_columns(tmp_path, columns).findings
     assert {finding.kind for finding in findings} == {FindingKind.DEPTH}
     assert [finding.column for finding in findings] == ["leftadduction_pos", "rightadduction_pos"]
+
+
+@pytest.mark.parametrize(("shift_deg", "reported"), [(-4, True), (-2, False), (0, False), (2, False), (4, True)])
+def test_a_swing_of_another_height_than_the_level_arms_is_reported(
+    shift_deg: float, reported: bool, tmp_path: Path
+) -> None:
+    """The edge is 14.5 mm above the surface in swing; 4 degrees are 8 mm."""
+    columns, settings = lab_columns(), SETTINGS | {"extraction_height": "0"}
+    shifted(shift_deg / 360.0)(columns)
+    log = read_lab_csv(write_lab_log(tmp_path / "run.csv", columns, settings))
+    assert [f.column for f in log.findings] == ["rightadduction_pos"] * reported
+    assert all("wrong by 4 degrees" in f.text for f in log.findings) and not np.isnan(log.angle_rad).any()
 
 
 def test_a_swing_higher_than_the_set_height_leaves_the_joint_out(tmp_path: Path) -> None:
