@@ -38,6 +38,7 @@ HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, few
 CLIPPED = 0.3  # of a stance's samples, in saturated batches: the mean force is that of the motor within a few percent
 DEEP_FRACTION = 0.7  # of the deepest part of a path
 MOTOR, BODY = "limited_by_motor", "limited_by_body"
+SHORT = "the sweep in the mud is too short"
 
 
 class Base(Enum):
@@ -196,7 +197,8 @@ def _bound(
     most = most_withstood(withstood, run)
     samples = sum(batch.samples for batch in batches)
     if most is None:
-        return Shear(None, True, case, samples, reason)
+        known = (case, samples, reason) if case == MOTOR else ("unknown", samples, SHORT)
+        return Shear(None, True, *known)
     largest, spread = most
     scatter = spread / 4.0  # of the median of five, whose range is 2.3 times their scatter
     fit = OriginFit(largest, hypot(scatter, QUICK_UNCERTAINTY * largest))

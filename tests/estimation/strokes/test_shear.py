@@ -282,6 +282,12 @@ def test_a_plate_in_the_air_gives_no_estimate(base: Base) -> None:
     assert found([], base).fit is None
 
 
+@pytest.mark.parametrize("body_fraction", [0.0, 1.0, nan])
+def test_a_flipper_that_hardly_sweeps_says_nothing_of_the_body(body_fraction: float) -> None:
+    shear = found(pressed(poses(body_fraction, count=2)))
+    assert (shear.fit, shear.case, shear.reason) == (None, "unknown", "the sweep in the mud is too short")
+
+
 @given(st.lists(st.floats(), min_size=COUNT, max_size=COUNT), st.floats(0.0, 1.0), st.floats(), st.floats())
 def test_no_torque_makes_it_raise(
     torques_nm: list[float], body_fraction: float, drag_n: float, surface_m: float
