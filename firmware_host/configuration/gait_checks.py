@@ -4,8 +4,8 @@ Each problem is one message with file, phase, key, value and bound. The currents
 expects (control/depth/forecast.py): k_p Φ on the way down, half of k_e Φ, the peak of an extraction, on the way up; and
 backward or forward k_s Ψ, or what moves a body against its drag if that is less, also on a fixed base, where a sweep at
 its limit lags behind. Where no mud is known, the paper's of 49.5 % water is expected. A phase ends where its force
-reaches `until_force_n`, and the stride goes on from there. The acceleration of body and arms is not in it: it lasts
-tens of milliseconds.
+reaches `until_force_n` or its depth `until_depth_m`, and the stride goes on from there. The acceleration of body and
+arms is not in it: it lasts tens of milliseconds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ from estimation.force_map import smallest_force_n
 from firmware_host.configuration.configuration import Configuration
 
 POINTS = 16  # of each row, equally far apart in time: the daemon checks a gait within a few ticks
-FINE_POINTS = 64  # of a row that a force ends
+FINE_POINTS = 64  # of a row that a force or a depth ends
 ROUNDING_M = 1e-9  # of a depth on a path
 PEAK_FRACTION = 0.5  # of k_e Φ
 EXPECTED_N_M3 = {"k_p": 0.82e6, "k_s": 0.46e6, "k_e": 1.45e6}  # 49.5 % water, docs/results/loadcell.json
@@ -209,19 +209,24 @@ def _current_problems(path: GaitPath, configuration: Configuration, depth_m: flo
 def _loaded_poses(
     path: GaitPath, configuration: Configuration, depth_m: float, mud: MudEstimate
 ) -> Iterator[tuple[int, Pose, tuple[float, float]]]:
-    """Yield phase, pose and torques along a stride in which this mud ends phases at their `until_force_n`."""
+    """Yield phase, pose and torques along a stride in which phases end at their `until_force_n` or `until_depth_m`."""
     geometry, rows = configuration.geometry, stride_table(path, configuration.geometry, depth_m)
     for number, phase in enumerate(path.phase):
-        points = POINTS if phase.until_force_n is None else FINE_POINTS
+        points = POINTS if phase.until_force_n is phase.until_depth_m is None else FINE_POINTS
         for pose in [pose for row in rows if row.number == number for pose in _poses(row, points)]:
             reached_m = min(pose.depth_m, geometry.deepest_m(degrees(pose.sweep_rad)))  # as the gait does
             angles_rad = pose.sweep_rad, geometry.adduction_rad(pose.sweep_rad, reached_m)
             torques_nm = expected_torques_nm(pose, angles_rad[1], configuration, mud)
-            if hypot(*smallest_force_n(geometry, *angles_rad, *torques_nm)) >= (phase.until_force_n or inf):
+            if _ends(phase, hypot(*smallest_force_n(geometry, *angles_rad, *torques_nm)), reached_m):
                 depth_m = pose.depth_m if phase.name == "insertion" else depth_m
                 rows = stride_table(path, geometry, depth_m, Begun(number + 1, pose.sweep_rad, pose.depth_m))
                 break
             yield number, pose, torques_nm
+
+
+def _ends(phase: GaitPhase, force_n: float, depth_m: float) -> bool:
+    until_n, until_m = (inf if each is None else each for each in (phase.until_force_n, phase.until_depth_m))
+    return force_n >= until_n or depth_m >= until_m
 
 
 def expected_torques_nm(

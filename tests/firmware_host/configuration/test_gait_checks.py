@@ -144,6 +144,17 @@ def test_a_phase_takes_no_more_current_than_the_force_that_ends_it(configuration
     ]
 
 
+@pytest.mark.parametrize(("until_depth_m", "phases"), [(0.02, []), (0.045, ["phase 1", "phase 3"])])
+def test_a_phase_takes_no_more_current_than_at_the_depth_that_ends_it(
+    configuration: Configuration, until_depth_m: float, phases: list[str]
+) -> None:
+    firm, document = Coefficient(2e6, 1e5, 1e5, 0.03, -0.3, 0.1, 3), gait_document("slow_insertion")
+    document["phase"][0] |= {"until_force_n": 50.0, "until_depth_m": until_depth_m}
+    mud = NOTHING_KNOWN._replace(k_p=firm, k_e=firm._replace(value=4e6))
+    found = gait_problems(read_gait(document), configuration, [0.05], mud)
+    assert [re.findall(r"phase \d", each)[0] for each in found] == phases
+
+
 def test_a_gait_that_adapts_is_checked_at_every_depth_but_not_for_currents(configuration: Configuration) -> None:
     """An extraction at 0.8 m/s is too quick from 4.5 cm on. Firm mud that takes too much at 3 cm adapts the depth."""
     walking, quick = read_gait(gait_document("walking")), gait_document("walking")
