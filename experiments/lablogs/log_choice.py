@@ -7,15 +7,20 @@ groups of their own, `walk 15.6N`, because a walking robot does not repeat a str
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from filecmp import cmp
 from fnmatch import fnmatchcase
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 from experiments.reports.mud_names import mud_key
 from experiments.study.option import OptionError
-from firmware_host.log.log_folder import SEGMENT
+from firmware_host.log.log_folder import SEGMENT, age_of
+from firmware_host.trial import Trial
 from logs.files.log_error import LogError
+from logs.files.log_summary import trial_of
+from logs.files.scanned_log import scan_log
 from logs.files.whole_files import is_hidden
 from logs.lab.csv_table import unpack
 from logs.lab.lab_csv import is_lab_csv, log_name
@@ -55,9 +60,13 @@ def find_logs(folders: Sequence[Path]) -> list[Paths]:
     for path in sorted(found.values(), key=lambda each: len(each.parts)):  # of two copies the one higher up stays
         if not any(_is_copy(path, other) for other in paths):
             paths.append(path)
+    first: dict[Path, Path] = {}
+    for path in sorted(paths, key=age_of):
+        before = _segment_before(path)
+        first[path] = first[before] if before in first and _trial_in(before) == _trial_in(path) else path
     runs: dict[Path, list[Path]] = {}
     for path in paths:
-        runs.setdefault(_first_segment(path, paths), []).append(path)
+        runs.setdefault(first[path], []).append(path)
     return [tuple(sorted(run)) for run in runs.values()]
 
 
@@ -73,15 +82,20 @@ def _is_copy(path: Path, other: Path) -> bool:
         return False  # the reader says what is wrong with it
 
 
-def _first_segment(path: Path, paths: Sequence[Path]) -> Path:
-    """Return the first of the segments of the run that follow each other up to this one, all of one trial."""
-    while segment := SEGMENT.fullmatch(path.stem):
-        number, trial = int(segment["number"]), segment["trial"] or ""
-        before = path.with_name(f"{segment['run']}-{number - 1:04d}{trial}{path.suffix}")
-        if number == 0 or before not in paths:
-            break
-        path = before
-    return path
+def _segment_before(path: Path) -> Path | None:
+    """Return the path that the segment before this one has if both are of one trial."""
+    segment = SEGMENT.fullmatch(path.stem)
+    if segment is None or int(segment["number"]) == 0:
+        return None
+    trial = segment["trial"] or ""
+    return path.with_name(f"{segment['run']}-{int(segment['number']) - 1:04d}{trial}{path.suffix}")
+
+
+def _trial_in(path: Path) -> Trial:
+    """Return the description in a log, of which its name has a part alone: none of "泥" and of a note."""
+    with suppress(LogError):
+        return trial_of(scan_log(path, from_s=inf))
+    return {}
 
 
 def matches(name: str, pattern: str) -> bool:

@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 from experiments.lablogs.log_choice import GroupRule, find_logs, group_key, group_of, groups_of
+from firmware_host.log.log_file import LogFile
+from firmware_host.trial import METADATA_KEY
+from tests.firmware_host.synthetic_rows import OPENING
 
 
 @pytest.mark.parametrize(
@@ -62,6 +65,15 @@ def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_or_trial_are_o
         (below / name if name.startswith("two") else below.parent / name).touch()
     found = find_logs([tmp_path, below, tmp_path / "a" / "one.csv"])
     assert sorted([path.name for path in paths] for paths in found) == runs
+
+
+def test_trials_with_other_descriptions_are_logs_of_their_own_though_their_names_are_alike(tmp_path: Path) -> None:
+    """A file's name has nothing of a note, and no letters but those of ASCII."""
+    trials = ["{}", '{"mud": "泥"}', '{"mud": "砂"}', '{"mud": "砂"}', '{"mud": "砂", "note": "rain"}']
+    for number, trial in enumerate(trials):
+        opening = OPENING | {"metadata": {"run_id": "run", "segment": str(number), METADATA_KEY: trial}}
+        LogFile(tmp_path / f"run-{number:04d}.mcap", opening).finish()
+    assert [[path.stem[-1] for path in paths] for paths in find_logs([tmp_path])] == [["0"], ["1"], ["2", "3"], ["4"]]
 
 
 @pytest.mark.parametrize(
