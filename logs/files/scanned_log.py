@@ -123,7 +123,7 @@ def join_logs(paths: Sequence[Path], logs: Sequence[ScannedLog]) -> ScannedLog:
     for log in ordered:
         tally.add_after(log.tally)
     metadata = dict(ordered[0].metadata)
-    if len({log.metadata.get(METADATA_KEY) for log in ordered}) > 1:
+    if len({log.metadata.get(METADATA_KEY) for log in ordered} - {None}) > 1:  # a rest after a trial has none
         metadata.pop(METADATA_KEY, None)
     if any(log.metadata.get("recovered") == "true" for log in ordered):
         metadata["recovered"] = "true"

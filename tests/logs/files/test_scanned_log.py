@@ -11,15 +11,17 @@ import pytest
 
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import TICK, TICK_KIND
+from firmware_host.trial import METADATA_KEY, Trial, to_json
 from logs.files import scanned_log
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_logs
-from logs.files.log_summary import log_summary
+from logs.files.log_summary import log_summary, trial_of
 from logs.files.scanned_log import scan_log, scan_logs
 from logs.recovery import recover_log
 from tests.firmware_host.synthetic_rows import OPENING, encode_row
 
 TICKS = 3000
+POND: Trial = {"mud": "pond"}
 
 
 def write_ticks(path: Path, numbers: list[int], segment: int = 0) -> Path:
@@ -53,6 +55,19 @@ def test_blocks_are_the_ticks_in_the_order_of_their_numbers(tmp_path: Path, fart
     assert log.tally.farthest <= farthest and log.rows == len(numbers)
     if farthest < TICKS:  # no block waits for the end of the log
         assert max(map(len, blocks)) <= 2 * (300 + 180) + farthest
+
+
+@pytest.mark.parametrize(
+    ("described", "joined"), [((POND, POND, {}), POND), ((POND, POND | {"note": "rain"}), {}), (({}, POND), {})]
+)
+def test_a_trial_keeps_its_description_when_it_is_joined_with_the_rest_after_it(
+    tmp_path: Path, described: tuple[Trial, ...], joined: Trial
+) -> None:
+    paths = [tmp_path / f"run-{number}.mcap" for number in range(len(described))]
+    for number, (path, trial) in enumerate(zip(paths, described, strict=True)):
+        of_trial = {METADATA_KEY: to_json(trial)} if trial else {}
+        LogFile(path, OPENING | {"metadata": {"run_id": "run", "segment": str(number)} | of_trial}).finish()
+    assert trial_of(scan_logs(paths)) == joined
 
 
 def test_a_run_with_a_recovered_segment_was_recovered(tmp_path: Path) -> None:
