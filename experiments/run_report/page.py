@@ -79,6 +79,7 @@ R_SQUARED = (
     "root mean squares. A lower bound has no fit. The table has the median over strides."
 )
 DEPTHS = "Coefficients from other depths differ also in the same mud."
+UNNAMED = "Muds that the robot noticed have no names: give them with --mud."
 COMPARED = (
     "Speed and coefficients of each run by mud. Bars are two standard errors, grey dashes the strides; an arrow marks "
     "a lower bound."
@@ -340,7 +341,7 @@ def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result
         compared += " The error that all strides of one robot share is left out: it moves its runs alike."
     texts = {
         "Result": f"{' '.join(_comparison_sentences(runs, headlines, labels, found))}\n\n{UNCERTAINTY}",
-        "Differences": compared if found else f"No other run has a value in a mud of the same name as one of {first}.",
+        "Differences": compared if found else f"No other run has a value in a mud named as one of {first}. {UNNAMED}",
     }
     rows = []
     for label, headline in zip(labels.values(), headlines, strict=True):

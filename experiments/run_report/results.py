@@ -6,7 +6,8 @@ standard error is that of a ratio: the scatter of the steps around speed times d
 Coefficients are means over the strides of both flippers (coefficient_table.py). They fall with depth, so the depths
 stand next to them.
 
-Each run is compared with the first one in the muds that both have under the same name. The error that all strides of
+Each run is compared with the first one in the muds that both have under the same name. Muds that a robot noticed have
+none: alike by two digits of k_p, they may be two muds, and one mud may read otherwise. The error that all strides of
 one robot share, such as that of its torque constants, moves its runs alike: where both are of the same robot only the
 errors of the strides count. A difference is shown where it exceeds two of its standard errors.
 """
@@ -23,14 +24,13 @@ from control.faults import FAULT_KINDS, Reaction
 from control.records import COEFFICIENTS, UNKNOWN, Phase
 from estimation.ground_law import UNDECIDED, LawEvidence, law_evidence, readings_of
 from estimation.strokes.origin_fit import student_factor
-from experiments.pictures.mud_layout import UNMEASURED
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.depth_law import NARROWEST, fit_depth_law, law_finding, re_entered
 from experiments.reports.mud_names import mud_key
-from experiments.run_report.run import Run
+from experiments.run_report.run import MudsFrom, Run
 from firmware_host.operator.reports import law_report
 from firmware_host.trial import KEYS, Trial
 from logs.fault_history import LoggedCause
@@ -219,9 +219,10 @@ def differences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[Entry]:
     return [
         each
         for run, headline in list(zip(runs, headlines, strict=True))[1:]
+        if MudsFrom.ROBOT not in (runs[0].muds_from, run.muds_from)
         for before in headlines[0]["muds"]
         for after in headline["muds"]
-        if mud_key(before["mud"]) == mud_key(after["mud"]) and not before["mud"].startswith(UNMEASURED)
+        if mud_key(before["mud"]) == mud_key(after["mud"])
         for each in _between(runs[0], before, run, after)
     ]
 

@@ -18,7 +18,7 @@ from control.modes import Mode
 from control.records import Phase
 from estimation.ground_law import UNDECIDED, LawEvidence
 from estimation.strokes.origin_fit import student_factor
-from experiments.pictures.mud_layout import UNMEASURED, MudLayout, layout_of_lengths
+from experiments.pictures.mud_layout import MudLayout, layout_of_lengths
 from experiments.run_report.page import comparison_result, report_of
 from experiments.run_report.results import (
     SPEED,
@@ -30,7 +30,7 @@ from experiments.run_report.results import (
     speed_of,
     travel_of,
 )
-from experiments.run_report.run import Run, _mud_of, _placed, _trials_in, read_runs
+from experiments.run_report.run import MudsFrom, Run, _mud_of, _placed, _trials_in, read_runs
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.trial import BEGUN, OperatorReport
 from logs.fault_history import LoggedCause
@@ -170,7 +170,8 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     first = run_with([1.0e6, 1.1e6], mud="w = 48.5 %")
     assert set(between(first, run_with([1.0e6, 1.1e6], mud="48.50"))) == {SPEED, "k_p", "k_s", "k_e"}
     assert between(first, run_with([1.0e6, 1.1e6], mud="pond")) == {}
-    assert between(*[run_with([1.0e6, 1.1e6], mud=UNMEASURED)] * 2) == {}  # which is not known to be one mud
+    noticed = replace(first, muds_from=MudsFrom.ROBOT)  # of which no two are known to be one mud
+    assert between(noticed, first) == between(first, noticed) == {}
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
 
 
