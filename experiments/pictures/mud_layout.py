@@ -64,10 +64,9 @@ def layout_of_track(track: Track) -> MudLayout:
 
 def mud_regions(walk: RecordedWalk, layout: MudLayout | None) -> list[MudRegion]:
     """Return the muds along the time axis: by the arrival of the body in them, or as the robot noticed them."""
-    end_s = float(walk.time_s[-1])
-    starts_s = [0.0, *walk.mud_starts_s] if layout is None else [0.0, *_arrivals_s(walk, layout)]
-    pieces = [(start_s, until_s) for start_s, until_s in pairwise([*starts_s, end_s])]
-    names = _described(walk, pieces) if layout is None else list(map(mud_label, layout.names))
+    starts_s, muds = ([0.0, *walk.mud_starts_s], []) if layout is None else _arrivals(walk, layout)
+    pieces = [*pairwise([*starts_s, float(walk.time_s[-1])])]
+    names = _described(walk, pieces) if layout is None else [mud_label(layout.names[mud]) for mud in muds]
     return [
         MudRegion(start_s, until_s, name)
         for (start_s, until_s), name in zip(pieces, names, strict=True)
@@ -75,13 +74,16 @@ def mud_regions(walk: RecordedWalk, layout: MudLayout | None) -> list[MudRegion]
     ]
 
 
-def _arrivals_s(walk: RecordedWalk, layout: MudLayout) -> list[float]:
-    """Return when the body first arrived at each border; the end of the walk where it never did."""
-    arrivals_s = []
-    for border_m in layout.ends_m[:-1]:
-        beyond = np.flatnonzero(walk.body_x_m >= border_m)
-        arrivals_s.append(float(walk.time_s[beyond[0] if len(beyond) else -1]))
-    return arrivals_s
+def _arrivals(walk: RecordedWalk, layout: MudLayout) -> tuple[list[float], list[int]]:
+    """Return when the body first arrived in each mud, forward or backward, and the number of that mud."""
+    known = np.flatnonzero(np.isfinite(walk.body_x_m))
+    if not len(known):
+        return [0.0], [0]
+    position_m = walk.body_x_m[known]
+    farthest = np.minimum if position_m[-1] < position_m[0] else np.maximum
+    muds = farthest.accumulate(np.searchsorted(layout.ends_m[:-1], position_m, side="right"))
+    changes = np.flatnonzero(np.diff(muds)) + 1
+    return [0.0, *walk.time_s[known[changes]].tolist()], muds[[0, *changes]].tolist()
 
 
 def _described(walk: RecordedWalk, pieces: Sequence[tuple[float, float]]) -> list[str]:

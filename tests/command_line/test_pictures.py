@@ -190,12 +190,16 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(walk
     ]
 
 
-def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(walk: RecordedWalk) -> None:
-    position_m = np.linspace(0.0, 0.5, len(walk.time_s))
+@pytest.mark.parametrize("is_backward", [False, True])
+def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(walk: RecordedWalk, is_backward: bool) -> None:
+    position_m, borders_m = np.linspace(0.0, 0.5, len(walk.time_s)), [0.0, 0.1, 0.4, 0.5]
+    names = ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last one was not reached
+    if is_backward:
+        position_m, borders_m, names = position_m[::-1], borders_m[::-1], names[::-1]
     track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
     regions = mud_regions(walk._replace(body_x_m=position_m), layout_of_track(track))
-    assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last was not reached
-    borders_s = np.interp([0.0, 0.1, 0.4, 0.5], position_m, walk.time_s)
+    assert [name for *_, name in regions] == names
+    borders_s = [walk.time_s[np.argmin(np.abs(position_m - border_m))] for border_m in borders_m]
     np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
     assert regions[-1][1] == walk.time_s[-1]
 
