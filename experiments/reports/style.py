@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from logs.files.whole_files import whole_file
+
 WIDTH_IN = 10.0  # of a picture on a page
 INK = "#33302c"
 FAINT = "#8c867d"  # helper lines and small text
@@ -49,5 +51,5 @@ def save_picture(draw: Callable[[], Any], path: Path) -> None:
     """Draw a figure of matplotlib in the common style and save it as a PNG, SVG or PDF file."""
     from matplotlib import rc_context  # slow to import
 
-    with rc_context(STYLE):
-        draw().savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+    with rc_context(STYLE), whole_file(path) as hidden:
+        draw().savefig(hidden, metadata={"Date": None} if path.suffix == ".svg" else None)

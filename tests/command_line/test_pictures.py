@@ -17,10 +17,11 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
 from experiments.pictures.walk_plot import draw_walk
-from experiments.reports.style import OUTCOME_COLOURS
+from experiments.reports.style import OUTCOME_COLOURS, save_picture
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
 from tests.command_line.command_lines import failure, output, refusal, run
+from tests.full_disk import files_of_at_most
 
 
 def png_size(path: Path) -> tuple[int, int]:
@@ -202,6 +203,15 @@ def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(walk: Recorded
     borders_s = [walk.time_s[np.argmin(np.abs(position_m - border_m))] for border_m in borders_m]
     np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
     assert regions[-1][1] == walk.time_s[-1]
+
+
+def test_a_full_disk_leaves_the_picture_before(tmp_path: Path) -> None:
+    path = tmp_path / "picture.png"
+    save_picture(Figure, path)
+    before = path.read_bytes()
+    with files_of_at_most(100), pytest.raises(OSError, match="File too large"):
+        save_picture(Figure, path)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
 
 
 # refused options
