@@ -20,6 +20,7 @@ from experiments.study.page import write_result
 from experiments.study.results_folder import PAGE
 from experiments.study.session import Ending
 from experiments.study.values import folder, mud_length
+from firmware_host.configuration.file_problems import why_not
 from logs.files.log_error import LogError
 from logs.files.whole_files import copy_whole
 
@@ -60,7 +61,7 @@ def log_report(
             summary = {"schema": f"log-{name}/{SCHEMAS[f'log-{name}']}"} | result.json()
             written = write_result(out, replace(result, logs=logs), summary, watch=watch)
         except OSError as problem:
-            raise LogError(f"{problem.filename or out}: {problem.strerror or problem}") from None
+            raise LogError(why_not(problem, out)) from None
     for run in runs:
         complain_of(run.paths[0], run.replay.findings)
     print(fill(result.texts["Result"].partition("\n\n")[0], TERMINAL), file=sys.stderr)

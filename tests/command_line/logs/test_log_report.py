@@ -21,6 +21,7 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.command_line.command_lines import failure, json_of, output, run
 from tests.folders import SHARED_DATA
+from tests.full_disk import files_of_at_most
 from tests.recorded_walks import record_walks
 
 pytestmark = pytest.mark.usefixtures("png_alone")
@@ -164,12 +165,14 @@ def test_logs_that_cannot_be_read_are_refused_by_name(two_walks: Path, tmp_path:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_log_given_twice_and_an_unwritable_folder_are_refused(two_walks: Path, tmp_path: Path) -> None:
+def test_a_log_given_twice_an_unwritable_folder_and_a_full_disk_are_refused(two_walks: Path, tmp_path: Path) -> None:
     log, other = str(two_walks), str(shutil.copy(two_walks, tmp_path))
     assert f"{log}: given twice" in failure("log", "report", log, log)
     assert f"{other}: has the name of {log}" in failure("log", "report", log, other)
     (tmp_path / "file").touch()
     assert "Not a directory" in failure("log", "report", log, "--out", str(tmp_path / "file" / "out"))
+    with files_of_at_most(1000):
+        assert str(tmp_path / "out") in failure("log", "report", log, "--out", str(tmp_path / "out"))
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
