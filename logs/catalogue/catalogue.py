@@ -211,10 +211,13 @@ def _without_copies(present: Iterable[tuple[Path, FileStamp]]) -> list[tuple[Pat
 
 
 def _mark_copies(entries: Iterable[LogEntry]) -> list[LogEntry]:
-    """Return the entries, of which one alone has the numbers of a segment of a run: renamed copies have none."""
+    """Return the entries, of which one alone has the numbers of a segment of a run: renamed copies have none.
+
+    That is the longest file: an annotation is added to a log, and a copy may be older than it.
+    """
     first: dict[object, str] = {}
     marked = []
-    for entry in sorted(entries, key=lambda each: (not each.file.startswith((DONE, PRESERVED)), each.file)):
+    for entry in sorted(entries, key=lambda log: (-log.bytes, not log.file.startswith((DONE, PRESERVED)), log.file)):
         contents = (entry.run, entry.segment, entry.duration_s, entry.recovered)
         original = first.setdefault(contents, entry.file) if entry.run and entry.state == "whole" else entry.file
         marked.append(entry if entry.file == original else _copy_of(original, entry))

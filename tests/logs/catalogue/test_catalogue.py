@@ -11,6 +11,7 @@ import pytest
 from control.modes import Mode
 from firmware_host.log.log_file import EXPORTED, LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
+from logs.annotation import annotate
 from logs.catalogue import catalogue as catalogue_module
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, CatalogueError, catalogue_path
 from logs.catalogue.entry import LogEntry
@@ -139,6 +140,17 @@ def test_a_copy_of_a_log_counts_once(folder: Path, readings: list[str]) -> None:
     (folder / "report" / "run-0000.mcap").unlink()
     entry = updated(folder)["report/same.mcap"]  # the only one now
     assert (entry.state, entry.run) == ("whole", "other") and entry.duration_s is not None
+
+
+def test_a_log_that_was_annotated_is_no_copy_of_one_that_was_not(folder: Path) -> None:
+    path = make_log(folder / "day.mcap", run_id="other", segment="0")
+    (folder / "day-report").mkdir()
+    copy = path.replace(folder / "day-report" / "day.mcap")
+    path.write_bytes(copy.read_bytes())
+    annotate(path, {"mud": "B"})
+    entries = updated(folder)
+    assert (entries["day.mcap"].state, entries["day.mcap"].mud) == ("whole", "B")
+    assert entries["day-report/day.mcap"].reason == "of day.mcap"
 
 
 def test_two_logs_of_one_name_are_two_entries(folder: Path) -> None:
