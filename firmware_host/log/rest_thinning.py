@@ -37,8 +37,6 @@ class RestThinning:
 
     def thin(self, rows: Iterable[tuple[int, bytes]]) -> Thinned:
         """Return the rows to write, in the order in which they came."""
-        if self._every == 1:
-            return Thinned(list(rows), "")
         written: list[tuple[int, bytes]] = []
         notice = ""
         for row in rows:
@@ -54,14 +52,14 @@ class RestThinning:
         self._mode = mode
         self._rested = 0 if active else self._rested + 1
         was_resting, self.resting = self.resting, self._rested > self._full_ticks
-        if was_resting and not self.resting:
+        if was_resting and not self.resting and self._every > 1:
             held = self.release()
             written += held
             written.append(row)
             return f"end of the rest: the {len(held)} ticks held back before this one are written after all"
         (number,) = struct.unpack_from("<I", row[1], self._number_at)
         (self._held if self.resting and number % self._every else written).append(row)
-        begins = self.resting and not was_resting
+        begins = self.resting and not was_resting and self._every > 1
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""
 
     def release(self) -> list[tuple[int, bytes]]:

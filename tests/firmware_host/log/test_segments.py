@@ -67,8 +67,11 @@ def make_report(kind: str, trial: dict[str, str], tick: int = 0) -> tuple[int, b
     return make_event(OperatorReport(kind, datetime.now(UTC), "uid 0", to_json(trial)).event, tick / 380)
 
 
-def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_rest(tmp_path: Path) -> None:
-    log = make_segments(tmp_path, replace(BY_TIME, rest_hz=10.0, rest_full_s=0.5))
+@pytest.mark.parametrize("rest_hz", [10.0, 0.0])
+def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_rest(
+    tmp_path: Path, rest_hz: float
+) -> None:
+    log = make_segments(tmp_path, replace(BY_TIME, rest_hz=rest_hz, rest_full_s=0.5))
     trials = [{"mud": "../A", "trial": "3", "note": "rain"}, {"mud": "грязь"}, {}, {"mud": "B"}]
     first = 0
     for trial, ticks in zip(trials, (500, 100, 100, 100), strict=True):
