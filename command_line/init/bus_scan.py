@@ -52,7 +52,9 @@ def with_found(robot: NewRobot, found: Found, given: Mapping[str, int]) -> NewRo
             text = f"{channel}: {len(ids)} drives answer ({', '.join(map(str, ids)) or 'none'})"
             more = ": name each joint's with --node" if len(ids) > len(joints) else ": check power, wiring and ids"
             raise ConfigurationError([f"{text} for the {len(joints)} joints on it{more}"])
-        node_ids |= dict(zip(joints, ids, strict=False))
+        left = [joint for joint in joints if joint not in given]
+        taken = {given[joint] for joint in joints if joint in given}
+        node_ids |= dict(zip(left, (each for each in ids if each not in taken), strict=False))
     return robot._replace(drive_type=types[0], node_ids=node_ids | dict(given))
 
 

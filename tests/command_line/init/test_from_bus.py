@@ -56,6 +56,15 @@ def test_type_ids_serial_numbers_and_models_are_written(tmp_path: Path, attach: 
         assert "DM8009" in path.read_text(encoding="utf-8")
 
 
+def test_a_named_joint_leaves_the_other_ids_to_the_other_joints(tmp_path: Path, attach: Attach) -> None:
+    attach(can0=drives_of("odrive", 0, 1, 2, 3))
+    path = tmp_path / "robot.toml"
+    status, message = init(path, "--channel", "can0", "--node", "left_sweep=3")
+    assert status == exit_codes.OK, message
+    drives = load_configuration(path).drive
+    assert [drives[joint].node_id for joint in JOINTS] == [3, 0, 1, 2]
+
+
 def test_each_flipper_s_bus_gives_its_own_joints(tmp_path: Path, attach: Attach) -> None:
     attach(can0=drives_of("odrive", 0, 1), can1=drives_of("odrive", 0, 1))
     path = tmp_path / "robot.toml"
