@@ -29,7 +29,7 @@ from command_line.shared_options import Socket
 from control.computing.suggestion import similar_name
 from control.modes import ENERGISED
 from experiments.study.option import Option
-from operator_client.status_client import NoDaemonError, StatusClient
+from operator_client.status_client import DroppedError, NoDaemonError, StatusClient
 
 PATIENT: Run = partial(run_command, timeout_s=None)  # a dpkg that is ended leaves half a package
 PRINT_KEYS = """\
@@ -103,6 +103,8 @@ def energised_mode(socket: Socket) -> str:
     try:
         with StatusClient(socket) as client:
             mode = str(client.call("status")["mode"])
+    except DroppedError:  # it runs, in whatever mode
+        raise
     except NoDaemonError:
         return ""
     return mode if mode in {each.name.lower() for each in ENERGISED} else ""

@@ -26,6 +26,7 @@ from command_line.install.service_plan import (
 )
 from command_line.install.upgrade import key_changes, upgrade
 from control.modes import ENERGISED, Mode
+from operator_client.status_client import DroppedError
 from tests.command_line.fake_client import FakeClient, next_of
 from tests.folders import ROOT
 
@@ -123,6 +124,16 @@ def test_it_is_installed_unless_drives_have_torque(
         assert refused.value.status == exit_codes.REFUSED and not computer.installed
     else:
         assert computer.upgrade() == exit_codes.OK and computer.installed
+
+
+def test_no_upgrade_under_a_daemon_that_does_not_say_its_mode(
+    computer: Computer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dropped = DroppedError("made room for another client")
+    monkeypatch.setattr(upgrade_module, "StatusClient", lambda socket: FakeClient(lambda method: dropped))
+    with pytest.raises(DroppedError):
+        computer.upgrade()
+    assert not computer.installed
 
 
 def test_no_upgrade_to_a_version_that_refuses_the_configuration(computer: Computer) -> None:
