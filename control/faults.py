@@ -183,7 +183,8 @@ class FaultKind(StrEnum):
     DRIVE_VERSION = (
         "drive_version", "drive", NONE, ALWAYS, WHEN_GONE, 2,
         "A drive's firmware is unknown or not supported.",
-        "The {subject} drive's firmware is {version}; {supported} is supported.", "install a supported firmware",
+        "The {subject} drive's firmware is {version}; {supported} is supported.",
+        "correct its type or model in [drive.JOINT], or install a supported firmware",
     )
     DUPLICATE_NODE_ID = (
         "duplicate_node_id", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 500,

@@ -205,6 +205,7 @@ def test_an_unsupported_firmware_is_a_fault(bench: Bench, version: str, shown: s
     bench.drives.report(0, firmware=version, firmware_supported=False, supported_firmware="0.6")
     fault = FaultKind.DRIVE_VERSION.fault("left_sweep", version=shown, supported="0.6")
     assert bench.tick(Mode.IDLE, bench.states()) == [fault]
+    assert "type or model" in fault.advice  # an ODrive 3.6 has no newer firmware
 
 
 @pytest.mark.parametrize(
