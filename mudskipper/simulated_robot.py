@@ -55,7 +55,8 @@ def ready_client(processes: LocalRobot) -> Iterator[Client]:
         while (report := client.status())["mode"] != "idle" or report["fault"]:
             processes.check_processes()
             if time.monotonic() > deadline_s:
-                raise TimeoutError(f"the simulated robot is not ready after {READY_S:g} s: {report['fault']}")
+                why = report["fault"]["message"] if report["fault"] else f"it is in mode {report['mode']}"
+                raise TimeoutError(f"the simulated robot is not ready after {READY_S:g} s: {why}")
             time.sleep(POLL_S)
         yield client
 

@@ -48,6 +48,18 @@ def test_a_wait_for_torque_ends_at_once_with_the_fault_that_took_it_away(
         robot.wait_for(wanted, timeout_s=0.0)
 
 
+@pytest.mark.parametrize(
+    ("fault", "why"), [({"message": "left_sweep has 24.0 V."}, "left_sweep has 24.0 V"), (None, "it is in mode boot")]
+)
+def test_a_simulated_robot_that_does_not_become_ready_says_why(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, fault: dict[str, str] | None, why: str
+) -> None:
+    monkeypatch.setattr(mudskipper.Client, "status", lambda _: {"mode": "boot", "fault": fault})
+    monkeypatch.setattr(simulated_robot, "READY_S", 0.0)
+    with pytest.raises(TimeoutError, match=f": {why}"), simulated_robot.ready_client(bench):
+        pass
+
+
 def test_a_wait_for_the_hold_ends_at_once_where_another_program_disarms(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
