@@ -55,11 +55,12 @@ class Ground(_Tables):
 
     def __init__(self, file: str | Path | None = None, /, **tables: Any) -> None:
         document = {} if file is None else parse_document(read_text(Path(file)), Path(file))
-        if alone := {key: tables.pop(key) for key in sorted(OF_SEGMENT & tables.keys())}:
-            if "segment" in document | tables:
+        given = {key: value for key, value in (document | tables).items() if value is not None}
+        if alone := {key: given.pop(key) for key in sorted(OF_SEGMENT & given.keys())}:
+            if "segment" in given:
                 raise ConfigurationError([f"{min(alone)}: cannot be combined with segment; remove one of them"])
-            tables["segment"] = [{"start_m": 0.0, "end_m": TRACK_M} | alone]
-        super().__init__(document | tables)
+            given["segment"] = [{"start_m": 0.0, "end_m": TRACK_M} | alone]
+        super().__init__(given)
         read_world(self.tables)
 
 

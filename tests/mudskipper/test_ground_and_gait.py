@@ -34,6 +34,8 @@ def test_keywords_count_more_than_the_file_and_none_leaves_a_key_out() -> None:
     assert changed == Gait("ellipse", depths_m=np.array([0.02, 0.03])).tables
     level = Ground(WORLD, ridges=None).tables
     assert "ridges" not in level and level["stone"] == Ground(WORLD).tables["stone"]
+    firm = Ground(WORLD, segment=None, strength_pa=2500.0).tables
+    assert len(firm["segment"]) == 1 and firm["disturbances"] == Ground(WORLD).tables["disturbances"]
     assert Ground(sand="generic", strength_pa=None).tables["segment"][0].keys() == {"start_m", "end_m", "sand"}
 
 
