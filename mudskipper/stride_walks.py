@@ -5,7 +5,7 @@ Both report a stride with the same keys and units: those of the socket's `stride
 
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from math import fsum
 from pathlib import Path
@@ -140,8 +140,11 @@ class DaemonWalk:
         return sweep["angle_rad"], lift["angle_rad"], self._body_m or 0.0
 
     def end(self) -> None:
-        """Stop the robot, which walks on otherwise, and let its operator arm it again."""
+        """Stop the robot and switch its torque off: only its operator, who arms it, lets it walk again."""
         self._client.stop()
+        with suppress(RuntimeError):  # a fault or an operator has switched the torque off already
+            self._client.wait_for("hold")
+            self._client.disarm()
         self._client.release()
 
     def close(self) -> None:

@@ -155,6 +155,9 @@ def test_an_operator_arms_the_robot_of_a_socket_before_each_reset_and_close_stop
             walk.reset()
             _, _, fault, over, info = walk.step(np.zeros(3, np.float32))
             assert over and not fault and info["advance_m"] > 0.01
+            with pytest.raises(RuntimeError, match="idle"):
+                walk.reset()
+            operator.arm()
             assert operator.wait_for("hold")["lease"] is None
             walk.reset()
             walk.close()  # in the middle of an episode
