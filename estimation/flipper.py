@@ -72,6 +72,7 @@ class ClosingStride(NamedTuple):
     zero: Zero
     tare_drift_n: float
     friction_error_nm: float
+    unknown_friction_nm: float  # of a joint whose friction no swing has shown
     along_path: bool
 
 
@@ -226,7 +227,7 @@ class FlipperEstimator(StrideEstimator):
         """
         own = self._own_surfaces.update(found, 0.0)
         yield
-        k_p = yield from fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        k_p = yield from fit_insertion(self.geometry, below, own, (self._tare.zero.std_error_n, 0.0))
         lift = 0.0
         if self.lift_n < inf:
             yield
@@ -268,6 +269,7 @@ class FlipperEstimator(StrideEstimator):
             zero=self._tare.zero,
             tare_drift_n=self._tare.drift_n,
             friction_error_nm=self._air.std_error_nm,
+            unknown_friction_nm=self._air.unknown_nm,
             along_path=self._along_path,
         )
         return self._learn_stride(stride)
@@ -316,9 +318,11 @@ class FlipperEstimator(StrideEstimator):
         return median([batch.sweep_nm + self._air.friction_nm for batch in stance]) if stance else 0.0
 
     def _learn_extraction(self, stride: ClosingStride, rising: Sequence[Batch]) -> Work[Estimate]:
+        """Fit k_e. The zero was found on the way down, so a friction that is not known counts twice on the way up."""
         stroke, surface = stride.extraction, stride.surface
+        zero_errors_n = stride.zero.std_error_n, 2.0 * stride.unknown_friction_nm / self.geometry.flipper_length_m
         reported = yield from fit_extraction(
-            self.geometry, rising, surface, stride.zero.std_error_n, self._extractions, stroke.first_m
+            self.geometry, rising, surface, zero_errors_n, self._extractions, stroke.first_m
         )
         if reported.valid or not stride.is_stuck:
             return reported

@@ -63,6 +63,11 @@ class AirSwing:
                 self.std_error_nm, self._measured = MEASURED_NM, True
         self._begin()
 
+    @property
+    def unknown_nm(self) -> float:
+        """The error of a friction that no swing has shown; 0 for a measured one."""
+        return 0.0 if self._measured else UNKNOWN_FRICTION_NM
+
     def is_push(self, stance_nm: float) -> bool:
         """Return whether the sweep torque of a stance, friction included, needs mud to explain it."""
         return stance_nm > MUD_RATIO * (self.friction_nm + MUD_NM)

@@ -42,21 +42,22 @@ SIDE_YIELDS = 0.2  # of the plate's thickness: Matlock's 4 times 2.5 ε b, with 
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
+ZeroErrors = tuple[float, float]  # of the force in air, in N: that of a stroke, and that of all strokes of a session
 UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not observable in this pose"
 
 
 def fit_insertion(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_errors_n: ZeroErrors
 ) -> Work[Estimate]:
     """Fit k_p, in bounded units."""
-    return _fit(geometry, batches, surface, zero_error_n, None, 1.0, inf)
+    return _fit(geometry, batches, surface, zero_errors_n, None, 1.0, inf)
 
 
 def fit_extraction(
     geometry: FlipperGeometry,
     batches: Sequence[Batch],
     surface: Surface,
-    zero_error_n: float,
+    zero_errors_n: ZeroErrors,
     scatter: ScatterMemory,
     start_m: float,
 ) -> Work[Estimate]:
@@ -64,7 +65,7 @@ def fit_extraction(
 
     `start_m` is the depth from which the flipper rises; the scatter of its short strokes is pooled.
     """
-    return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, _deepest_m(surface, start_m))
+    return _fit(geometry, batches, surface, zero_errors_n, scatter, -1.0, _deepest_m(surface, start_m))
 
 
 def _deepest_m(surface: Surface, start_m: float) -> float:
@@ -144,7 +145,7 @@ def _fit(
     geometry: FlipperGeometry,
     batches: Sequence[Batch],
     surface: Surface,
-    zero_error_n: float,
+    zero_errors_n: ZeroErrors,
     scatter: ScatterMemory | None,
     sign: float,
     deepest_m: float,
@@ -160,9 +161,10 @@ def _fit(
     scales_m = [depth_m / growth_exponent(geometry, depth_m) for depth_m in pieces.depths_m]
     per_surface = _slope_per_surface(fit, pieces.moments, pieces.torques, scales_m)
     stroke = FittedStroke(pieces.samples, deepest_m, median(pieces.speeds_m_s))
-    own = hypot(per_surface * surface.own_error_m, 1.5 * zero_error_n / (edge_m2 * deepest_m))
+    own_zero, shared_zero = (1.5 * error_n / (edge_m2 * deepest_m) for error_n in zero_errors_n)
+    own = hypot(per_surface * surface.own_error_m, own_zero)
     cross_coupling_error = CROSS_COUPLING_UNCERTAINTY * _slope(pieces.moments, pieces.crossed_nm)
-    shared = hypot(per_surface * levelling_m(surface), cross_coupling_error)
+    shared = hypot(per_surface * levelling_m(surface), cross_coupling_error, shared_zero)
     return evaluated(scatter.pooled(fit) if scatter else fit, own, shared, stroke)
 
 

@@ -26,7 +26,7 @@ def swung(friction_nm: float, inertia_nm: float = 0.0, air: AirSwing | None = No
 def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm: float) -> None:
     air = swung(friction_nm, inertia_nm)
     assert air.friction_nm == pytest.approx(friction_nm, abs=1e-3)
-    assert air.std_error_nm == MEASURED_NM
+    assert (air.std_error_nm, air.unknown_nm, AirSwing().unknown_nm) == (MEASURED_NM, 0.0, UNKNOWN_FRICTION_NM)
 
 
 def test_dragged_mud_only_adds_so_the_least_swing_counts() -> None:

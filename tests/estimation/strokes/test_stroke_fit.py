@@ -91,13 +91,13 @@ def up(k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: flo
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
-    return finish(fit_insertion(GEOMETRY, batches, surface, zero_error_n))
+    return finish(fit_insertion(GEOMETRY, batches, surface, (zero_error_n, 0.0)))
 
 
 def extraction(
     batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0, start_m: float = 0.03
 ) -> Estimate:
-    return finish(fit_extraction(GEOMETRY, batches, surface, zero_error_n, ScatterMemory(), start_m))
+    return finish(fit_extraction(GEOMETRY, batches, surface, (zero_error_n, 0.0), ScatterMemory(), start_m))
 
 
 # the law is found
@@ -181,6 +181,16 @@ def test_the_uncertainty_of_the_surface_is_that_of_a_moved_one(error_m: float) -
     reported = systematic(insertion(down(), surface_at(0.0, error_m)))
     deeper, higher = (insertion(down(), surface_at(sign * error_m)).value for sign in (1.0, -1.0))
     assert reported == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
+
+
+def test_an_error_of_the_zero_that_all_strokes_share_does_not_compare_them() -> None:
+    def errors(zero_errors_n: tuple[float, float]) -> tuple[float, float]:
+        found = finish(fit_extraction(GEOMETRY, up(), NOMINAL, zero_errors_n, ScatterMemory(), 0.03))
+        return found.repeatability, found.std_error
+
+    none, own, shared = errors((0.0, 0.0)), errors((0.8, 0.0)), errors((0.0, 0.8))
+    assert shared[0] == none[0] < 0.5 * own[0]
+    assert shared[1] == pytest.approx(own[1])
 
 
 def test_the_uncertainty_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
