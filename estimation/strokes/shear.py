@@ -16,6 +16,7 @@ body's drag the body cannot have moved; otherwise the largest force withstood is
 
 from collections.abc import Sequence
 from enum import Enum
+from itertools import pairwise
 from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
@@ -36,6 +37,7 @@ QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
 CLIPPED = 0.3  # of a stance's samples, in saturated batches: the mean force is that of the motor within a few percent
+CATCHES_UP = 0.5  # of the flipper's travel since the last position: a body that stood meanwhile moves less
 DEEP_FRACTION = 0.7  # of the deepest part of a path
 MOTOR, BODY = "limited_by_motor", "limited_by_body"
 SHORT = "the sweep in the mud is too short"
@@ -147,10 +149,22 @@ def shear_samples(
 def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:
     """Return the plate's slip through the mud from batch to batch; None if the body's position is unknown."""
     fixed = base is Base.FIXED
-    if not fixed and not all(isfinite(b.body_m) for b in batches):
+    if not fixed and not _is_followed(geometry, batches):
         return None
     positions_m = [geometry.flipper_length_m * sin(b.sweep_rad) + (0.0 if fixed else b.body_m) for b in batches]
     return [before_m - after_m for before_m, after_m in zip(positions_m, positions_m[1:], strict=False)]
+
+
+def _is_followed(geometry: FlipperGeometry, batches: Sequence[Batch]) -> bool:
+    """Return whether the pose follows the body from batch to batch.
+
+    One that comes too rarely is held for some batches, in which the plate seems to slip, and then catches up.
+    """
+    known = [(batch.body_m, geometry.flipper_length_m * sin(batch.sweep_rad)) for batch in batches]
+    moved = [i for i, (before, after) in enumerate(pairwise(known), 1) if before[0] != after[0]]
+    held = [(known[i], known[j]) for i, j in pairwise(moved) if j > i + 1]
+    jumps = [after_m - before_m > CATCHES_UP * (front_m - rear_m) for (before_m, front_m), (after_m, rear_m) in held]
+    return all(isfinite(body_m) for body_m, _ in known) and not any(jumps)
 
 
 def _yielding(geometry: FlipperGeometry, batches: Sequence[Batch], slips: list[float] | None) -> list[int]:
@@ -182,7 +196,8 @@ def _without_pose(
         steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
         if len(steady) >= MIN_BATCHES:
             return _value("yield", steady, batches, moments)
-    return _bound(geometry, "unknown", "no pose: the body may have moved", batches, held)
+    lack = "the pose comes too rarely" if all(isfinite(b.body_m) for b in batches) else "no pose"
+    return _bound(geometry, "unknown", f"{lack}: the body may have moved", batches, held)
 
 
 def _bound(

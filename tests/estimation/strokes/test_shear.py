@@ -240,6 +240,20 @@ def test_without_a_pose_a_short_stance_gives_no_value() -> None:
     assert found(without_pose(pressed(poses(count=5), 1e3))).at_least
 
 
+def at_rate(batches: Sequence[Batch], held: int) -> list[Batch]:
+    """Hold each position of the body for so many batches."""
+    return [batch._replace(body_m=batches[i - i % held].body_m) for i, batch in enumerate(batches)]
+
+
+def test_a_pose_that_comes_too_rarely_makes_no_value_of_a_bound() -> None:
+    """A body that hardly advances, and whose encoder has coarse counts, is held too, but never catches up."""
+    firm, soft = pressed(poses(0.95), K_S / 3.0), pressed(poses(0.1))
+    for held in (3, 4, 5):
+        shear = found(at_rate(firm, held))
+        assert (shear.at_least, shear.reason) == (True, "the pose comes too rarely: the body may have moved")
+        assert found(at_rate(soft, held)).case == "yield"
+
+
 # bounds
 
 
