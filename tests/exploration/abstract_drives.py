@@ -82,6 +82,10 @@ class AbstractAxis:
         self.missing_heartbeats = min(self.missing_heartbeats + 1, SILENT_HEARTBEATS)
 
     @property
+    def may_be_on(self) -> bool:
+        return self.closed_loop
+
+    @property
     def state(self) -> DriveState:
         """Return the state as of the last heartbeat, which was sent half a tick before it was read."""
         if not self.heard:
