@@ -103,7 +103,7 @@ def energised_mode(socket: Socket) -> str:
     try:
         with StatusClient(socket) as client:
             mode = str(client.call("status")["mode"])
-    except DroppedError:  # it runs, in whatever mode
+    except DroppedError:  # it runs, in a mode that it does not say
         raise
     except NoDaemonError:
         return ""

@@ -56,8 +56,7 @@ AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
 STABLE_FRACTION = 0.85  # of the excursion before, which fades: a loop with 0.09 of critical damping keeps 0.75 in 40 ms
 FAST_SWING_FRACTION = 0.75  # of half a swing of a sound joint: its motor is at least 1.8 times as strong
-SHAKEN = 8  # torques in a row, each in another direction than the one before; 4 in a quick swing, 7 when a stone
-# has thrown the joint in stiff mud
+SHAKEN = 8  # torques in turn; 4 in a quick swing, and 7 in stiff mud of a joint that a stone has thrown
 SHAKING_FRACTION = 1.0 / 3.0  # of the torque limit, and at least PRESSING_NM
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
