@@ -6,8 +6,6 @@ from typing import Annotated, TypeAlias
 from experiments.study.option import Option
 from operator_client.default_paths import default_socket
 
-DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
-
 Json: TypeAlias = Annotated[bool, Option("print JSON for programs")]
 Socket: TypeAlias = Annotated[
     str | PathLike[str],

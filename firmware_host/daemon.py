@@ -33,7 +33,8 @@ from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import INSTALLED, load_configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.service_file import CONFIGURATION, service_configuration
 from firmware_host.configuration.socket_paths import rows_path
 from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
@@ -246,10 +247,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="mudskipperd", description="The robot's real-time controller.", allow_abbrev=False
     )
-    parser.add_argument("--config", type=Path, action="append", help=f"(default: {INSTALLED})")
+    parser.add_argument("--config", type=Path, action="append", help=f"(default: the service's, /{CONFIGURATION})")
     parser.add_argument("--check-config", action="store_true", help="validate the configuration and exit")
     options = parser.parse_args(arguments)
-    path, *others = options.config or [INSTALLED]
+    path, *others = options.config or [service_configuration()]
     if others:
         parser.error(f"argument --config: is given twice, as {path} and {others[0]}; give it once")
     try:

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line.doctor.findings import Finding, Level, fail, ok, ok_if, warn
-from command_line.doctor.host_facts import UNIT
 from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
 from drivers.can.can_fd import FD_MTU, carries_fd
 from drivers.drive import DriveParameters
 from drivers.drive_types import traffic_of
 from firmware_host.configuration.configuration import BusParameters, Configuration
+from firmware_host.configuration.service_file import UNIT
 
 QUEUE_FRAMES = (16, 64)  # a shorter queue overflows in the tick of arming, a longer one delivers old torques late
 LONGEST_RESTART_MS = 1000

@@ -31,14 +31,11 @@ from command_line.doctor.host_checks import (
     this_account,
 )
 from command_line.doctor.host_facts import (
-    UNIT,
     clock_is_synchronised,
     has_clock_chip,
     process_limits,
-    service_configuration,
     thread_priority,
     unit_limits,
-    unit_text,
 )
 from command_line.json_output import Answer
 from command_line.screen import MARKS, coloured
@@ -51,6 +48,7 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.service_file import UNIT, service_configuration, unit_text
 from firmware_host.pose_sources import open_pose
 from firmware_host.sockets.user_groups import load_rights
 from firmware_host.software_version import is_compiled, software_version

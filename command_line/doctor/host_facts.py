@@ -13,6 +13,8 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
+from firmware_host.configuration.service_file import unit_text
+
 TIME_ERROR = 5  # adjtimex(2): the clock is not synchronised
 REFUSED = -1
 TIMEX_BYTES = 256  # struct timex has 208
@@ -20,8 +22,6 @@ CAN_INTERRUPT = re.compile(r"irq/\d+-.*(can|mcp25|spi|xhci|dwc|ehci)", re.IGNORE
 RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted after the name in brackets
 LIMIT_LINES = ("Max realtime priority", "Max locked memory")  # in /proc/PID/limits
 UNITS = " KMGTPE"  # of a limit: powers of 1024
-UNIT = "etc/systemd/system/mudskipper.service"
-CONFIGURATION = "etc/mudskipper/mudskipper.toml"
 
 
 class Limits(NamedTuple):
@@ -67,17 +67,6 @@ def unit_limits(root: Path) -> Limits | None:
     if not settings:
         return None
     return Limits(_limit(settings.get("LimitRTPRIO", "0")), _limit(settings.get("LimitMEMLOCK", "0")), "in the unit")
-
-
-def unit_text(root: Path) -> str:
-    """Return the text of the installed service's unit with its drop-ins."""
-    return "\n".join(map(read_text, [root / UNIT, *sorted((root / f"{UNIT}.d").glob("*.conf"))]))
-
-
-def service_configuration(root: Path) -> Path:
-    """Return the file that the installed service reads, which a drop-in may change."""
-    named = re.findall(r"^ExecStart=.*--config[ =]/?(\S+)", unit_text(root), re.MULTILINE)
-    return root / (named[-1] if named else CONFIGURATION)
 
 
 def _limit(text: str) -> float:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from command_line import exit_codes
-from command_line.doctor.host_facts import CONFIGURATION, service_configuration
 from command_line.install.service_plan import (
     Command,
     MakeLink,
@@ -26,6 +25,7 @@ from command_line.install.service_plan import (
 )
 from command_line.screen import complain
 from experiments.study.option import Option
+from firmware_host.configuration.service_file import CONFIGURATION, service_configuration
 
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit hide them
 COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from command_line import exit_codes
-from command_line.doctor.host_facts import CONFIGURATION, UNIT, service_configuration
 from command_line.errors import CommandError
+from firmware_host.configuration.service_file import CONFIGURATION, UNIT, service_configuration
 from firmware_host.sockets.user_groups import VIEWERS
 
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit

@@ -13,7 +13,6 @@ from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from command_line import exit_codes
-from command_line.doctor.host_facts import service_configuration
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
 from command_line.install.installation import run_command
@@ -29,6 +28,7 @@ from command_line.shared_options import Socket
 from control.computing.suggestion import similar_name
 from control.modes import ENERGISED
 from experiments.study.option import Option
+from firmware_host.configuration.service_file import service_configuration
 from operator_client.status_client import DroppedError, NoDaemonError, StatusClient
 
 PATIENT: Run = partial(run_command, timeout_s=None)  # a dpkg that is ended leaves half a package

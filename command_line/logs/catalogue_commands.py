@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.json_output import Answer
-from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
+from command_line.logs.log_options import Folder
+from command_line.robot_options import RobotConfiguration, default_configuration
 from command_line.screen import complain, watched
-from command_line.shared_options import DEFAULT_CONFIG
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import table, value_shown
 from experiments.study.option import Option
@@ -49,7 +49,7 @@ def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) 
 
 def configured_folder(path: Path) -> Path:
     """Raises CommandError where no folder is named at all."""
-    if str(path) == DEFAULT_CONFIG and not path.exists():
+    if path == default_configuration() and not path.exists():
         raise usage_error(f"name the folder of the logs: there is no {path} that names one")
     from firmware_host.configuration.loading import load_configuration  # slow to import
 
@@ -64,7 +64,7 @@ def chosen_folder(named: Path | None, config: Path) -> Path:
     return folder
 
 
-def index(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED) -> Answer:
+def index(folder: Folder = None, *, config: RobotConfiguration) -> Answer:
     from logs.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(folder, config))
@@ -79,7 +79,7 @@ def query(
     sql: Annotated[str, Option('such as "select file, strides, speed_m_s from logs"', metavar="SQL")],
     folder: Folder = None,
     *,
-    config: FolderConfiguration = CONFIGURED,
+    config: RobotConfiguration,
 ) -> Answer:
     from logs.catalogue.catalogue import Catalogue
 

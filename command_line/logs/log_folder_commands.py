@@ -11,8 +11,9 @@ from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.json_output import Answer
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
-from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
+from command_line.logs.log_options import Folder
 from command_line.operation.trial import KeyValues, trial_text
+from command_line.robot_options import RobotConfiguration
 from command_line.screen import complain, watched
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
@@ -43,7 +44,7 @@ LEGEND = (
 )
 
 
-def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED) -> Answer:
+def list_logs(folder: Folder = None, *, config: RobotConfiguration) -> Answer:
     folder = chosen_folder(folder, config)
     entries = catalogued(folder)
     paths = {*stored_files(folder), *log_files(folder, PRESERVED), *entries}
@@ -129,7 +130,7 @@ def _listed(log: dict[str, Any]) -> list[str]:
 def recover(
     places: Annotated[tuple[Path, ...], Option("(default: the configured folder)", metavar="FILE|DIR")] = (),
     *,
-    config: FolderConfiguration = CONFIGURED,
+    config: RobotConfiguration,
 ) -> Answer:
     given = places or (configured_folder(config),)
     named = {path for path in given if not path.is_dir()}

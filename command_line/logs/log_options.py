@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
-from command_line.shared_options import DEFAULT_CONFIG
 from experiments.study.option import Option
 from firmware_host.configuration.configuration import CaptureAxis
 
 MOST = 100000
-CONFIGURED = Path(DEFAULT_CONFIG)
 LogFiles: TypeAlias = Annotated[
     tuple[Path, ...], Option("log of this project, its segments, or a CSV file of the paper's authors")
 ]
@@ -21,4 +19,3 @@ Vertical: TypeAlias = Annotated[
 ]
 Walk: TypeAlias = Annotated[int, Option("number of the walk (default: the last)", low=0, high=MOST)]
 Folder: TypeAlias = Annotated[Path | None, Option("of the logs (default: the configured one)", metavar="DIR")]
-FolderConfiguration: TypeAlias = Annotated[Path, Option("names the folder")]

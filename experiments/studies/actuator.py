@@ -22,7 +22,8 @@ from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Ending, Session
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import INSTALLED, load_configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.service_file import service_configuration
 
 
 def parse_weights(text: str) -> tuple[float, ...]:
@@ -56,14 +57,15 @@ def study(
     trials: Passes = PAPER_TRIALS,
     gravity: Annotated[float, Option("local gravity", low=9.7, high=9.9, unit="m/s²", metavar="M/S2")] = GRAVITY_M_S2,
     apply: Annotated[bool, Option("write the fitted constants to the configuration, after a prompt")] = False,
-    config: Annotated[Path | None, Option(f"to change (default: {INSTALLED})")] = None,
+    config: Annotated[Path | None, Option("to change (default: that of the daemon)")] = None,
     seed: Annotated[int, Option("of the simulated motor")] = 1,
 ) -> Result:
     """Weights on a joint: torque constants and friction."""
 
     def prepare(configuration: Configuration) -> tuple[Path | None, WeighingPlan]:
         """Return the file to change, and the plan for this robot."""
-        return find_target(config or INSTALLED, configuration.text, session) if apply else None, WeighingPlan(
+        file = config or service_configuration()
+        return find_target(file, configuration.text, session) if apply else None, WeighingPlan(
             joints=tuple(dict.fromkeys(joint)),
             weights_g=weights,
             trials=trials,

@@ -21,7 +21,8 @@ from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import INSTALLED, load_configuration, parse_configuration
+from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.service_file import service_configuration
 from simulation.harness.local_setup import with_simulated_watchdogs
 
 HAS_ROBOT = False  # no daemon's, at its socket
@@ -31,7 +32,7 @@ WEIGHTS_G, TRIALS = (100.0, 200.0, 400.0), 2  # within the default limits.torque
 def study(
     session: Session,
     *,
-    config: Annotated[Path | None, Option(f"of the robot, to change (default: {INSTALLED})")] = None,
+    config: Annotated[Path | None, Option("of the robot, to change (default: that of the daemon)")] = None,
     joint: Annotated[tuple[str, ...], Option("to calibrate (default: all)", choices=JOINTS)] = (),
     operator: Annotated[str | None, Option("of the record (default: this user)")] = None,
     lever: Lever = None,
@@ -46,8 +47,9 @@ def study(
 ) -> Result:
     """Signs, zeros, ranges, velocity, torque and friction of every joint, with hands and weights."""
     session = session._replace(simulated=session.simulated or practise)
-    configuration = _simulated(config) if session.simulated else load_configuration(config or INSTALLED)
-    target = find_target(config or INSTALLED, configuration.text, session)
+    file = config or service_configuration()
+    configuration = _simulated(config) if session.simulated else load_configuration(file)
+    target = find_target(file, configuration.text, session)
     joints = joint or configuration.rig.joints
     plan = WeighingPlan(
         joints=tuple(dict.fromkeys(joints)),

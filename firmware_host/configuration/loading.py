@@ -28,7 +28,6 @@ from firmware_host.configuration.toml_records import (
 )
 from firmware_host.configuration.weakened_protection import require_reason
 
-INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
 FORMER_KEYS = {  # key of version 0.1: present key in the same section; version 0.2 accepts both
     "faults.lag_share": "lag_fraction",
     "faults.disk_free_share": "disk_free_fraction",

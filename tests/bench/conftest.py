@@ -18,7 +18,8 @@ from experiments.bench.simulated_hand import simulated_operator
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import INSTALLED, load_configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.service_file import service_configuration
 from simulation.harness.blocks import resting_drop_m
 from tests.bench.staged_bench import (
     SKIPPED,
@@ -50,7 +51,8 @@ def opened(request: pytest.FixtureRequest) -> Iterator[TestRig | str]:
     options, robot = request.config.option, report_of(request.config).robot
     if not (options.simulated or options.can or options.config):
         pytest.skip(NOT_ASKED_FOR)
-    usual = INSTALLED if INSTALLED.exists() and not options.simulated else EXAMPLE_CONFIGURATION
+    installed = service_configuration()
+    usual = installed if installed.exists() and not options.simulated else EXAMPLE_CONFIGURATION
     path = Path(options.config) if options.config else usual
     kind = "simulated" if options.simulated else "hardware"
     stamp = datetime.now(UTC).isoformat(timespec="seconds")

@@ -51,7 +51,7 @@ WRONG_COMMAND_LINES = [  # and what the message names
     ("live --host 300.1.1.1", "--host 300.1.1.1"),
     ("live --page --host 192.0.2.1", "--host 192.0.2.1"),
     ("live --name robot.local", "--name belongs to --page"),
-    ("log list --config /none/robot.toml", "name the folder"),
+    ("log list", "name the folder of the logs: there is no /none/robot.toml"),
     ("log report x.mcap --mud =40", "--mud"),
     ("log report x.mcap --mud a --world b.toml", "--mud"),
     ("log report x.mcap --out text.mcap", "must be a folder"),
@@ -245,7 +245,7 @@ def test_a_wrong_input_is_refused_with_its_status_and_its_name(
 ) -> None:
     monkeypatch.chdir(inputs)
     monkeypatch.setattr("command_line.demo.demo.ENDING_SIGNALS", ())
-    monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
+    monkeypatch.setattr("command_line.robot_options.service_configuration", lambda: Path("/none/robot.toml"))
     before = set(inputs.iterdir())
     ended = run(*line.split(), MUDSKIPPER_SOCKET="/none.sock", XDG_RUNTIME_DIR=str(inputs))
     said = ended.stdout + ended.stderr

@@ -28,6 +28,7 @@ from command_line.doctor.host_checks import (
 from command_line.doctor.host_facts import Limits, Mount, can_interrupts, isolated_processors, mount_of, thread_priority
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
+from firmware_host.configuration.service_file import UNIT
 from firmware_host.log.log_folder import ACTIVE, FreeSpace
 from tests.folders import ROOT
 
@@ -149,13 +150,13 @@ def test_limits_are_read_of_a_process_and_of_the_unit(computer: Path, monkeypatc
     assert host_facts.process_limits(computer, None) == Limits(0, 8388608, "of this shell")
     assert host_facts.process_limits(computer, 78) is None
     assert host_facts.unit_limits(computer) is None
-    write(computer, {host_facts.UNIT: (ROOT / "systemd/mudskipper.service").read_text(encoding="utf-8")})
+    write(computer, {UNIT: (ROOT / "systemd/mudskipper.service").read_text(encoding="utf-8")})
     installed = host_facts.unit_limits(computer)
     assert installed == GOOD_LIMITS
     assert [finding.level for finding in examine_limits(LoopParameters(), installed)] == [OK, OK]
-    write(computer, {f"{host_facts.UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=20"})
+    write(computer, {f"{UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=20"})
     assert host_facts.unit_limits(computer) == Limits(20, inf, "in the unit")
-    write(computer, {f"{host_facts.UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=48:49\nLimitMEMLOCK=4G"})
+    write(computer, {f"{UNIT}.d/override.conf": "[Service]\nLimitRTPRIO=48:49\nLimitMEMLOCK=4G"})
     assert host_facts.unit_limits(computer) == Limits(48, 2**32, "in the unit")
 
 

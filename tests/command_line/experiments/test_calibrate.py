@@ -11,6 +11,7 @@ from command_line.main import main
 from experiments.studies import calibrate
 from experiments.study.prompt import AutomaticOperator
 from firmware_host.configuration.loading import load_configuration
+from tests.command_line.command_lines import failure
 from tests.experiments.calibration.test_calibration import TRUE_NM_A, WeighedRobot
 
 pytestmark = pytest.mark.usefixtures("png_alone")
@@ -44,6 +45,12 @@ def test_one_command_finds_what_a_simulated_robot_was_built_with(
     page = (tmp_path / "calibration.html").read_text(encoding="utf-8")
     assert "by Ada" in page and "drive.right_adduction.torque_constant_nm_a" in page
     assert main(command) == exit_codes.REFUSED  # it is finished
+
+
+def test_the_file_of_the_service_is_the_one_to_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "unit").write_text("ExecStart=/x --config /none/dropped_in.toml\n", encoding="utf-8")
+    monkeypatch.setattr("firmware_host.configuration.service_file.UNIT", str(tmp_path / "unit"))
+    assert "/none/dropped_in.toml" in failure("calibrate", "--out", str(tmp_path / "out"))
 
 
 @pytest.mark.parametrize("own", [False, True])

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.doctor.host_facts import CONFIGURATION, UNIT
 from command_line.errors import CommandError
 from command_line.install import installation, service_plan
 from command_line.install.installation import (
@@ -41,6 +40,7 @@ from command_line.install.service_plan import (
     plan_installation,
     plan_removal,
 )
+from firmware_host.configuration.service_file import CONFIGURATION, UNIT
 
 PREFIX = Path(sys.prefix)
 

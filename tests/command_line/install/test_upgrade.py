@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.doctor.host_facts import CONFIGURATION, UNIT
 from command_line.errors import CommandError
 from command_line.init.key_reference import configuration_keys
 from command_line.install import installation
@@ -26,6 +25,7 @@ from command_line.install.service_plan import (
 )
 from command_line.install.upgrade import key_changes, upgrade
 from control.modes import ENERGISED, Mode
+from firmware_host.configuration.service_file import CONFIGURATION, UNIT
 from operator_client.status_client import DroppedError
 from tests.command_line.fake_client import FakeClient, next_of
 from tests.folders import ROOT

@@ -114,9 +114,13 @@ def test_a_user_who_may_not_read_or_move_a_log_gets_advice(folder: Path, monkeyp
     assert "1.mcap: " in (message := failure("log", "preserve", log)) and message.endswith("as root")
 
 
-def test_the_configured_folder_is_the_default(folder: Path) -> None:
+def test_the_folder_of_the_service_is_the_default(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its unit, or a drop-in of it, names the configuration."""
     text = EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
     configuration = folder / "mudskipper.toml"
     configuration.write_text(text.replace("/var/lib/mudskipper/logs", str(folder)), encoding="utf-8")
     assert "1.mcap" in output("log", "list", "--config", str(configuration))
+    (folder / "unit").write_text(f"ExecStart=/x --config {configuration}\n", encoding="utf-8")
+    monkeypatch.setattr("firmware_host.configuration.service_file.UNIT", str(folder / "unit"))
+    assert "1.mcap" in output("log", "list")
     assert run("log", "recover", "--config", str(folder / "none.toml")).returncode == exit_codes.UNHEALTHY
