@@ -7,7 +7,8 @@ where the description is lost, they are taken to have that of this version. An e
 rows were lost, and so does the metadata at its beginning, so the file is read once to count, and once to write.
 
 The damaged file is renamed to NAME.broken; the new one is written, synchronised and renamed; only then is the damaged
-one removed. A recovery that is interrupted at any point is continued by the next one.
+one removed. A recovery that is interrupted at any point is repeated by the next one, from the damaged file; what it had
+written, NAME.part, is recovered only where that file is gone.
 """
 
 import os
@@ -125,10 +126,13 @@ def recover_log(path: Path, watch: Watch = unwatched) -> Recovered:
     """Recover one file. Raises LogError, and OSError; BlockingIOError where the log's writer lives."""
     with path.open("rb") as file:
         lock_file(file.fileno(), path)
-        if path.name.endswith(f"{ENDING}{PART}") or (ENDING in path.name and not path.stat().st_size):
+        if ENDING in path.name and not path.stat().st_size:
             path.unlink()
-            return Recovered(path, 0, 0, "an interrupted recovery, removed" if PART in path.name else "empty, removed")
-        target = finished_path(path.with_name(path.name.removesuffix(BROKEN)))
+            return Recovered(path, 0, 0, "empty, removed")
+        is_part = path.name.endswith(f"{ENDING}{PART}")
+        target = finished_path(path.with_name(path.name.removesuffix(PART if is_part else BROKEN)))
+        if is_part and (source := path.with_name(target.name + BROKEN)).exists():
+            raise LogError(f"{path}: left as it is: an interrupted recovery of {source}; recover that one")
         present_rows = _rows_of_whole(target) if target != path else None
         if (own_rows := _rows_of_whole(path, watch)) is not None and present_rows is None:
             if target != path:  # its writer ended between its last byte and the renaming
@@ -161,7 +165,7 @@ def _require_free(path: Path, *names: Path) -> None:
 
 def _rewrite(path: Path, target: Path, file: BinaryIO, salvage: Salvage, watch: Watch) -> Recovered:
     """Raises OSError, and LogError for a file that was changed meanwhile, which stays as NAME.broken."""
-    broken = path if path.name.endswith(BROKEN) else path.with_name(path.name + BROKEN)
+    broken = path.with_name(target.name + BROKEN)
     _require_free(path, broken, target)
     path.rename(broken)
     part = broken.with_name(target.name + PART)

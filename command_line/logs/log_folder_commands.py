@@ -148,7 +148,7 @@ def recover(
 
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[str]]:
-    """Recover the logs and returns messages about the others. Skips files of living writers that were not named."""
+    """Recover the logs and return messages about the others. Skips unnamed files that are being written, or gone."""
     from logs.recovery import recover_log  # slow to import, and a listing does without it
 
     recovered, problems = [], []
@@ -163,7 +163,8 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
                 if path in named:
                     problems.append(f"{path}: is being written; its writer will finish it")
             except OSError as problem:
-                problems.append(why_not_moved(path, problem))
+                if path in named or path.exists():
+                    problems.append(why_not_moved(path, problem))
     return recovered, problems
 
 

@@ -132,6 +132,21 @@ def test_a_recovery_that_was_cut_off_is_done_again(tmp_path: Path) -> None:
     assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
 
 
+def test_a_part_without_its_damaged_log_is_recovered_itself(tmp_path: Path) -> None:
+    """It is the last copy of these rows: it stays until the recovered log is written."""
+    path = make_cut_log(tmp_path)
+    part, broken = (path.with_name(path.name + ending) for ending in (".part", ".broken"))
+    broken.write_bytes(path.read_bytes())
+    path.rename(part)
+    with pytest.raises(LogError, match=f"left as it is: an interrupted recovery of {broken}"):
+        recover_log(part)
+    assert part.exists()
+    broken.unlink()
+    assert recover_log(part).rows == 5 * CHUNK
+    assert unfinished_files(tmp_path) == []
+    assert len(read_log(tmp_path / DONE / path.name).ticks) == 5 * CHUNK
+
+
 def test_a_recovery_ends_with_the_service_though_the_writer_ignores_that(tmp_path: Path) -> None:
     (tmp_path / ACTIVE).mkdir()
     os.mkfifo(tmp_path / ACTIVE / "hangs.mcap")

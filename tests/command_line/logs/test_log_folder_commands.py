@@ -75,6 +75,8 @@ def test_logs_are_listed_in_the_order_of_their_segments(tmp_path: Path) -> None:
 
 def test_recovery_of_a_folder_skips_logs_that_are_being_written(folder: Path) -> None:
     living = make_log(folder, "3.mcap")
+    (cut := folder / ACTIVE / "2.mcap").rename(cut.with_name("2.mcap.broken"))
+    cut.with_name("2.mcap.part").write_bytes(b"half")  # a recovery that was cut off, which this one replaces
     (log,) = json_of("log", "recover", str(folder))["recovered"]
     assert (log["path"], log["rows"], log["lost"]) == (str(folder / DONE / "2.mcap"), 381, 0)
     assert read_log(folder / DONE / "2.mcap").complete
