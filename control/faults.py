@@ -54,6 +54,8 @@ BUSY = "end other programs on this computer; 'mudskipper check' shows real-time 
 DISOBEYS = "check motor phases, encoder and cables; end other programs that command it; then 'mudskipper clear'"
 ENCODER = "check encoder, magnet and cable, then 'mudskipper clear'"
 OTHERS = "end other programs that command it; look for late or lost commands; then 'mudskipper clear'"
+THEN_CLEAR = "; then 'mudskipper clear'"
+COOL_AND_CLEAR = "let it cool, then 'mudskipper clear'; walk less deep or slower"
 SAME = ""
 
 
@@ -130,7 +132,7 @@ class FaultKind(StrEnum):
     )
     DRIVE_SILENT = (
         "drive_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 12,
-        "Neither position nor current came for ten ticks.", _silence("message"), WIRING,
+        "Neither position nor current came for ten ticks.", _silence("message"), WIRING + THEN_CLEAR,
     )
     POSITION_STALE = (
         "position_stale", "drive", DAMPING, ALWAYS, WHEN_GONE, 5,
@@ -138,7 +140,7 @@ class FaultKind(StrEnum):
     )
     POSITION_SILENT = (
         "position_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 12,
-        "No position came for ten ticks.", _silence("position"), WIRING,
+        "No position came for ten ticks.", _silence("position"), WIRING + THEN_CLEAR,
     )
     CURRENT_STALE = (
         "current_stale", "drive", HOLD, ALWAYS, WHEN_GONE, 5,
@@ -146,11 +148,11 @@ class FaultKind(StrEnum):
     )
     CURRENT_SILENT = (
         "current_silent", "drive", SOFT_STOP, ALWAYS, BY_HAND, 12,
-        "No current came for ten ticks.", _silence("current"), WIRING,
+        "No current came for ten ticks.", _silence("current"), WIRING + THEN_CLEAR,
     )
     HEARTBEAT_SILENT = (
         "heartbeat_silent", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 192,
-        "No heartbeat came for 0.5 s.", _silence("heartbeat"), WIRING,
+        "No heartbeat came for 0.5 s.", _silence("heartbeat"), WIRING + THEN_CLEAR,
     )
     TEMPERATURE_SILENT = (
         "temperature_silent", "drive", SOFT_STOP, ALWAYS, WHEN_GONE, 382,
@@ -189,7 +191,7 @@ class FaultKind(StrEnum):
     DUPLICATE_NODE_ID = (
         "duplicate_node_id", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 500,
         "Two drives on a bus send under one node id.", "Two drives send under the node id of the {subject} drive.",
-        "give every drive on a bus a node id of its own, one at a time",
+        "give every drive on a bus a node id of its own, one at a time" + THEN_CLEAR,
     )
     WRONG_DRIVE = (
         "wrong_drive", "drive", NONE, ALWAYS, WHEN_GONE, 2,
@@ -249,7 +251,7 @@ class FaultKind(StrEnum):
     )
     BUS_OFF = (
         "bus_off", "bus", DAMPING, ALWAYS, BY_HAND, 2,
-        "A bus controller has left the bus.", "The {subject} bus is off.", WIRES,
+        "A bus controller has left the bus.", "The {subject} bus is off.", WIRES + THEN_CLEAR,
     )
     BUS_REFUSES = (
         "bus_refuses", "bus", DAMPING, ALWAYS, WHEN_GONE, 5,
@@ -369,7 +371,7 @@ class FaultKind(StrEnum):
     )
     MOTOR_HOT = (
         "motor_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 100,
-        "A motor is too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL,
+        "A motor is too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL_AND_CLEAR,
     )
     WINDING_OVERHEATING = (
         "winding_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 11,
@@ -379,7 +381,7 @@ class FaultKind(StrEnum):
     WINDING_HOT = (
         "winding_hot", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 11,
         "A winding is too hot, estimated from its currents.",
-        "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.", COOL,
+        "The {subject} motor's winding has {temperature_c:.0f} degrees C, estimated from its currents.", COOL_AND_CLEAR,
     )
     VOLTAGE_LOW = (
         "voltage_low", "joint", WARN, NO, WHEN_GONE, 100,
@@ -414,7 +416,7 @@ class FaultKind(StrEnum):
     )
     LOOP_CRAWLING = (
         "loop_crawling", "loop", DRIVES_IDLE, ALWAYS, BY_HAND, 25,
-        "Commands are sent too rarely to brake a joint.", "The loop's ticks take {tick_ms:.0f} ms.", BUSY,
+        "Commands are sent too rarely to brake a joint.", "The loop's ticks take {tick_ms:.0f} ms.", BUSY + THEN_CLEAR,
     )
     LOOP_STALLED = (
         "loop_stalled", "loop", DAMPING, ALWAYS, WHEN_GONE, 2,

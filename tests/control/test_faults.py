@@ -22,6 +22,8 @@ def test_reaction_blocking_and_clearing_of_every_fault_agree() -> None:
             assert kind.reaction is Reaction.DRIVES_IDLE, kind
         if kind.clears is not Clears.WHEN_GONE:  # `clear` is refused while torque is on: a warning could not be cleared
             assert kind.reaction >= Reaction.SOFT_STOP, kind
+        if kind.clears is Clears.BY_HAND:
+            assert "'mudskipper clear'" in kind.what_to_do, kind
         assert kind.reaction > Reaction.NONE or kind.blocks is not Blocks.NO, kind
         assert 1 <= kind.bound_ticks <= 1900, kind  # two strides: a blocked swing is known once it repeats
 
