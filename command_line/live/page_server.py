@@ -23,7 +23,7 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.live.own_page import own_page
-from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion, send_order
+from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion, send_call
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
@@ -223,8 +223,8 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/can_stop":
             self._answer(*self.server.status.answer())
         elif self.path in ("/note", "/mark"):
-            answer = send_order(self.server.status_socket, self.path[1:], text=self._text())
-            self._answer(HTTPStatus.OK, answer.encode())
+            accepted, answer = send_call(self.server.status_socket, self.path[1:], text=self._text())
+            self._answer(HTTPStatus.OK if accepted else HTTPStatus.CONFLICT, answer.encode())
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 

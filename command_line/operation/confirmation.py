@@ -107,13 +107,16 @@ def _end(command: str, socket: Socket) -> Answer:
 
 def send_order(path: Socket, method: str, **params: Any) -> str:
     """Send an order over a connection of its own, and return what became of it: none waits for another."""
-    if method in ENDINGS:
-        return end_motion(path, method).answer
+    return end_motion(path, method).answer if method in ENDINGS else send_call(path, method, **params)[1]
+
+
+def send_call(path: Socket, method: str, **params: Any) -> tuple[bool, str]:
+    """Send an order that ends no motion; return whether the daemon accepted it, and what became of it."""
     try:
         with StatusClient(path, ANSWER_S) as client:
             answer = client.call(method, **params)
-            return f"{method}: {answer if isinstance(answer, str) else answer['time']}"
+            return True, f"{method}: {answer if isinstance(answer, str) else answer['time']}"
     except (CallRefusedError, NotPermittedError) as problem:
-        return f"{method} refused: {problem}"
+        return False, f"{method} refused: {problem}"
     except NoDaemonError as problem:
-        return f"{method}: {problem}"
+        return False, f"{method}: {problem}"
