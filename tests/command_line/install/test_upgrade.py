@@ -161,20 +161,25 @@ def test_a_computer_without_a_configuration_has_none_to_refuse(computer: Compute
 
 
 @pytest.mark.parametrize(
-    ("mode", "options"),
-    [("", ""), *((mode.name.lower(), "") for mode in Mode), ("hold", "--config {}"), ("hold", "--config={}")],
+    ("mode", "options", "active"),
+    [
+        *(("", "", active) for active in (False, True)),
+        *((mode.name.lower(), "", False) for mode in Mode),
+        *(("hold", options, False) for options in ("--config {}", "--config={}")),
+    ],
 )
-def test_the_package_refuses_in_the_same_modes(mode: str, options: str, tmp_path: Path) -> None:
-    """The scripts of the package also protect an upgrade by apt or dpkg alone; a broken program prevents none.
+def test_the_package_refuses_in_the_same_modes(mode: str, options: str, active: bool, tmp_path: Path) -> None:
+    """The scripts of the package also protect an upgrade by apt or dpkg alone.
 
-    The unit, or a drop-in of it, names the configuration; no unit is active here.
+    A program that is broken, or a daemon that gives no answer, prevents none unless the unit is active. The unit, or a
+    drop-in of it, names the configuration.
     """
     configuration = tmp_path / ("other.toml" if options else "mudskipper.toml")
     unit = f"ExecStart={{ path=/x/mudskipperd ; argv[]=/x/mudskipperd {options.format(configuration)} ; pid=0 }}"
     answers = f"test $MUDSKIPPER_SOCKET = own.sock && echo '{json.dumps({'mode': mode})}'"
     answer = f"#!/bin/sh\n{answers}" if mode else "#!/none"
     configuration.write_text('[status]\nsocket = "own.sock"\n', encoding="utf-8")
-    systemctl = f"#!/bin/sh\ntest $1 = show && echo '{unit}'"
+    systemctl = f"#!/bin/sh\ncase $1 in show) echo '{unit}' ;; --quiet) {str(active).lower()} ;; *) exit 1 ;; esac"
     for name, text in (("mudskipper", answer), ("systemctl", systemctl)):
         (tmp_path / name).write_text(text, encoding="utf-8")
         (tmp_path / name).chmod(0o755)
@@ -184,9 +189,9 @@ def test_the_package_refuses_in_the_same_modes(mode: str, options: str, tmp_path
         script = script.replace(folder, str(tmp_path))
     command = ["sh", "-c", script, "prerm", "upgrade"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False, env=path)
-    refuses = mode in {each.name.lower() for each in ENERGISED}
-    assert ended.returncode == refuses
-    assert ended.stderr.count("\n") == refuses and (f"in mode {mode}, " in ended.stderr) == refuses
+    refuses = active or mode in {each.name.lower() for each in ENERGISED}
+    assert ended.returncode == refuses and ended.stderr.count("\n") == refuses
+    assert not refuses or ("does not report its mode" if active else f"in mode {mode}, ") in ended.stderr
 
 
 def test_a_purge_of_the_package_removes_an_edited_unit_too(tmp_path: Path) -> None:
