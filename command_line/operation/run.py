@@ -33,6 +33,7 @@ from firmware_host.lease import TAKEN_OVER
 from operator_client.status_client import CallRefusedError, StatusClient
 
 LOWEST_HZ, HIGHEST_HZ = 1.0, 50.0  # a move of a client of 200 requests a second takes three
+FIRST_DEPTH_CM = 2.0
 Report = dict[str, Any]
 Law = Callable[[Any], Any]
 
@@ -42,15 +43,20 @@ def run(
     *,
     socket: Socket,
     json: Json = False,
-    depth: Annotated[float, Option("of the first stride", unit="cm", low=0.5, high=20.0)] = 2.0,
+    depth: Annotated[
+        float | None, Option(f"of the first stride (default: {FIRST_DEPTH_CM:g} cm)", unit="cm", low=0.5, high=20.0)
+    ] = None,
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
     take_over: TakeOver = False,
 ) -> Answer:
     """Move by a control law of your own; the robot stops with this command, and with a law that fails or is late."""
     with redirect_stdout(sys.stderr if json else sys.stdout):  # what the law prints is no JSON
         chosen, rate_hz = load_law(law)
-        if rate_hz and strides:
-            raise usage_error(f"--strides {strides}: must be left out, as this law has RATE_HZ and moves single joints")
+        for name, value in (("depth", depth), ("strides", strides)):
+            if rate_hz and value:
+                raise usage_error(
+                    f"--{name} {value:g}: must be left out, as this law has RATE_HZ and moves single joints"
+                )
         with StatusClient(socket) as client:
             if rate_hz:
                 return _move_joints(client, chosen, rate_hz, take_over)
@@ -63,7 +69,8 @@ def run(
                 if closed and (answer := order_of(chosen, closed)) is not None:
                     _give(client, "stride", answer, "walking")
 
-            return attend(client, json, {"depth_m": depth / 100.0, "strides": strides, "take_over": take_over}, order)
+            depth_m = (depth or FIRST_DEPTH_CM) / 100.0
+            return attend(client, json, {"depth_m": depth_m, "strides": strides, "take_over": take_over}, order)
 
 
 def _move_joints(client: StatusClient, law: Law, rate_hz: float, take_over: bool) -> Answer:

@@ -205,7 +205,8 @@ def test_a_law_of_joints_that_fails_stops_the_robot(
 @pytest.mark.parametrize("rate_hz", ["0.99", "50.01", "float('nan')", "'20'"])
 def test_a_rate_out_of_bounds_is_refused_before_the_robot_moves(tmp_path: Path, rate_hz: str) -> None:
     assert "RATE_HZ" in refusal("run", law(tmp_path, "return {}", rate_hz))
-    assert "--strides" in refusal("run", law(tmp_path, "return {}", "50.0"), "--strides", "3")
+    for option in ("--strides", "--depth"):  # of a law of strides
+        assert f"{option} 3: " in refusal("run", law(tmp_path, "return {}", "50.0"), option, "3")
 
 
 @pytest.mark.parametrize(
