@@ -107,8 +107,10 @@ class DaemonWalk:
         self._client.stride(depth_m, **gait)
 
     def walk_stride(self) -> Stride:
-        """Wait for the end of the stride; the time since the last one counts too, with the power at its end.
+        """Wait for the end of the stride; the time since the last one counts too.
 
+        A motor's work is its torque along the path of its joint between two reports. While the program learns, nothing
+        is reported: paths there and back cancel each other, so a stride of which little was seen has too little energy.
         A stride that ends without a pose has no advance: the next one with a pose has that of both.
         """
         first = last = self._before
@@ -117,9 +119,10 @@ class DaemonWalk:
             time.sleep(POLL_S)
             before, last = last, self._client.status()
             self._client.renew()
-            for joint, drive in enumerate(last["drives"]):
-                power_w = drive["torque_command_nm"] * (drive["velocity_rad_s"] or 0.0)
-                work_j[joint] += power_w * (last["now_s"] - before["now_s"])
+            for joint, (start, end) in enumerate(zip(before["drives"], last["drives"], strict=True)):
+                if start["angle_rad"] is not None and end["angle_rad"] is not None:
+                    torque_nm = (start["torque_command_nm"] + end["torque_command_nm"]) / 2.0
+                    work_j[joint] += torque_nm * (end["angle_rad"] - start["angle_rad"])
         self._before, begun_m = last, self._body_m
         if last["body_x_m"] is not None:
             self._body_m = last["body_x_m"]
