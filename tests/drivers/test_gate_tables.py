@@ -74,7 +74,8 @@ def test_another_payload_under_the_torque_s_id_is_replaced(protocol: Protocol, i
     for data in protocol.no_torque:
         assert bench.passed(protocol.torque_frame(data)) == [protocol.torque_frame(replacement)]
     assert bench.gate.refused == len(protocol.no_torque)
-    assert "neither a listed frame nor a torque" in bench.gate.last_refusal and "node 2" in bench.gate.last_refusal
+    assert "neither a listed frame nor a torque" in bench.gate.last_refusal
+    assert f"{data.hex(' ')} to node 2" in bench.gate.last_refusal  # and no torque between them
     assert ("replaced by zero torque" in bench.gate.last_refusal) is (replacement == protocol.table.zero_torque)
 
 
