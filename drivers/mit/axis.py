@@ -52,7 +52,6 @@ class MitAxis(AnsweringAxis):
 
     def reset(self) -> None:
         super().reset()
-        self._status = 0
         self._reported_fault: int | None = None  # of a RobStride, when it was asked
 
     @property
@@ -126,8 +125,8 @@ class MitAxis(AnsweringAxis):
 
     def _receive_status(self, status: int, flags: int) -> None:
         """Handle status and fault. A drive that left the mode by itself is not commanded back into it."""
-        if status != self._status or flags != self._error_flags:
-            self._status, self._error_flags, self._health = status, flags, None
+        if flags != self._error_flags:
+            self._error_flags, self._health = flags, None
         if flags or self.closed_loop and status != codec.ENABLED:
             self._following = False
         self.closed_loop = status == codec.ENABLED

@@ -20,7 +20,7 @@ from control.joint_pd import (
 )
 from control.parameters.arm_mass import ArmMass
 from control.parameters.joint_gains import JointGains
-from control.records import DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
+from control.records import DriveState, DriveStates, JointAngles, Joints, JointTarget
 from tests.control.synthetic_states import states_at
 
 Velocities = tuple[float, float, float, float]
@@ -69,9 +69,9 @@ def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, 
 @pytest.mark.parametrize("joint", range(4))
 def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: int) -> None:
     gains = JointGains(8.0, 0.06, 10.0, 0.08)
-    target = [JointTarget(0.0, 0.0)] * 4
-    target[joint] = JointTarget(0.1, 2.0)
-    torques = joint_torques_nm(Joints(*target), states_at(same_for_all(0.0)), gains, WEIGHTLESS, 1.0)
+    target = [JointTarget(0.3, 0.5)] * 4
+    target[joint] = JointTarget(0.4, 2.5)
+    torques = joint_torques_nm(Joints(*target), turning((0.5, 0.5, 0.5, 0.5)), gains, WEIGHTLESS, 1.0)
     expected = [0.0] * 4
     expected[joint] = (0.8 + 0.12) if joint % 2 == 0 else (1.0 + 0.16)
     assert torques == pytest.approx(expected)

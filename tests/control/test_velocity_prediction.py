@@ -29,7 +29,17 @@ def test_a_prediction_is_exact_for_any_torques_against_a_steady_load_and_for_ask
             velocities_rad_s[index] += PERIOD_S * (sent - load_nm) / inertias_kg_m2[index]
 
 
-@pytest.mark.parametrize("gap_s", [0.0, 0.3 * PERIOD_S, 5.0 * PERIOD_S])
+@pytest.mark.parametrize("elapsed_s", [0.51 * PERIOD_S, 1.49 * PERIOD_S])
+def test_the_acceleration_is_that_of_the_time_between_two_answers(elapsed_s: float) -> None:
+    prediction, slow = VelocityPrediction(ALL, MASS), DriveState(0.1, 1.0, angle_stamp_s=1.0, current_a=2.0)
+    prediction.update(same_for_all(slow), NONE)
+    faster = slow._replace(velocity_rad_s=1.0 + 100.0 * elapsed_s, angle_stamp_s=1.0 + elapsed_s)
+    present = prediction.update(same_for_all(faster), NONE)[0]
+    assert present.velocity_rad_s == pytest.approx(1.0 + 100.0 * (elapsed_s + PERIOD_S))
+    assert present._replace(velocity_rad_s=faster.velocity_rad_s) == faster
+
+
+@pytest.mark.parametrize("gap_s", [0.0, 0.49 * PERIOD_S, 1.51 * PERIOD_S, 5.0 * PERIOD_S])
 def test_nothing_is_predicted_from_a_repeated_answer_or_over_a_gap(gap_s: float) -> None:
     prediction, still = VelocityPrediction(ALL, MASS), DriveState(0.1, 0.0, angle_stamp_s=1.0)
     prediction.update(same_for_all(still), NONE)

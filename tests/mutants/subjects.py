@@ -16,6 +16,7 @@ class Subject(NamedTuple):
 
 A_TEXT = "a text of the diagram"
 CONTINUOUS = "it has the same value there from both sides"
+NO_NUMBER = "neither of them is finite either"
 MORE_OFTEN = "the same counters are only read more often"
 ROUNDED = "a sum of such times never is exactly the bound"
 SAME = "the same value replaces itself"
@@ -53,6 +54,8 @@ SUBJECTS = (
         ("control/test_limits.py",),
         equivalent={
             "True to False in `strict=True`": "each of them has one value for each joint",
+            "to Sub in `wanted + state.angle_rad`": NO_NUMBER,
+            "to Sub in `wanted + state.angle_rad + state.velocity_rad_s`": NO_NUMBER,
             "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
             "Gt to GtE in `velocity_rad_s > fade_rad_s`": CONTINUOUS,
             "Lt to LtE in `velocity_rad_s < -fade_rad_s`": CONTINUOUS,
@@ -166,7 +169,22 @@ SUBJECTS = (
         functions=("_end_lost_lease", "_limit", "_pop_request"),
         has_fixtures=True,
     ),
-    Subject("drivers.mit.axis", ("drivers/mit/test_axis.py",)),
+    Subject(
+        "drivers.mit.axis",
+        ("drivers/mit/test_axis.py", "drivers/test_every_axis.py"),
+        equivalent={
+            "Lt to LtE in `NEVER_S < asked_s < now_s`": SAME,
+            "always in `if self.closed_loop:`": "what an idle drive measures is forgotten with its answer",
+            "always in `if flags != self._error_flags:`": SPEED,
+        },
+    ),
+    Subject("drivers.moteus.axis", ("drivers/moteus/test_axis.py", "drivers/test_every_axis.py")),
+    Subject("drivers.odrive.axis", ("drivers/odrive/test_axis.py", "drivers/test_every_axis.py")),
+    Subject("drivers.odrive05.axis", ("drivers/odrive05/test_axis.py", "drivers/test_every_axis.py")),
+    Subject("drivers.drives", ("drivers/odrive/test_drives.py", "drivers/test_every_axis.py")),
+    Subject("control.joint_pd", ("control/test_velocity_prediction.py", "control/test_joint_pd.py")),
+    Subject("control.controller", ("control/test_controller.py",)),
+    Subject("firmware_host.fault_monitor", ("firmware_host/test_fault_monitor.py",), has_fixtures=True),
     Subject(
         "drivers.odrive.cansimple_axis",
         ("drivers/odrive/test_axis.py", "drivers/odrive/test_drives.py"),
@@ -182,7 +200,7 @@ SUBJECTS = (
                 )
             },
             "Gt to GtE in `self._read_before_s - heard_s > RESTART_SILENCE_S`": CONTINUOUS,
-            "to Sub in `turns + turns_s`": "neither of them is finite either",
+            "to Sub in `turns + turns_s`": NO_NUMBER,
         },
     ),
 )

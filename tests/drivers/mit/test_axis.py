@@ -50,9 +50,13 @@ class Bench:
         return self.axis.state
 
     def hear(self, identifier: int, data: bytes) -> None:
+        self.read()
+        self.axis.receivers[identifier](data, self.now_s - 0.001)
+
+    def read(self) -> None:
+        """Let a tick pass."""
         self.now_s += TICK_S
         self.axis.begin_read(self.now_s)
-        self.axis.receivers[identifier](data, self.now_s - 0.001)
 
     def enter(self) -> None:
         self.axis.prepare()
@@ -72,6 +76,13 @@ def test_an_answer_is_the_motion_of_the_joint(model: str, sign: int) -> None:
     assert state.temperature_c == (41.0 if bench.model.has_registers else 30.0)
 
 
+def test_an_answer_before_the_first_question_has_the_time_at_which_it_arrived() -> None:
+    bench = Bench(CUBEMARS)
+    data = codec.encode_answer(Answer(NODE, 0, 0.0, 0.0, 0.0, 30.0, 0), bench.model)
+    bench.axis.receivers[NODE](data, bench.now_s - 0.001)
+    assert bench.axis.state.angle_stamp_s == bench.now_s - 0.001
+
+
 def test_a_temperature_of_zero_is_that_of_no_sensor() -> None:
     bench = Bench(CUBEMARS)
     assert bench.answer(temperature_c=50.0).temperature_c == 50.0
@@ -81,8 +92,10 @@ def test_a_temperature_of_zero_is_that_of_no_sensor() -> None:
 @each_model
 def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(model: str) -> None:
     bench = Bench(model)
-    bench.axis.send_torque(0.0)
-    assert bench.last == codec.LEAVE
+    for ask in (bench.axis.poll, lambda: bench.axis.send_torque(0.0)):
+        bench.sent.clear()
+        ask()
+        assert bench.last == codec.LEAVE
     bench.enter()
     bench.axis.send_torque(0.0)
     assert codec.decode_torque(bench.last, bench.model.torque_nm) == 0.0
@@ -120,13 +133,46 @@ def test_a_fault_ends_the_mode_of_a_cubemars_and_it_is_not_entered_again() -> No
     assert bench.last == codec.LEAVE
 
 
-def test_a_damiao_that_left_the_mode_is_not_commanded_back_into_it() -> None:
+def test_a_cubemars_with_a_fault_does_not_enter_the_mode() -> None:
+    bench = Bench(CUBEMARS)
+    bench.axis.close_loop()
+    assert not bench.answer(fault=1).closed_loop
+    assert not bench.answer().closed_loop
+
+
+@pytest.mark.parametrize("status", [codec.LOST_COMMANDS, codec.DISABLED])
+def test_a_damiao_that_left_the_mode_is_not_commanded_back_into_it(status: int) -> None:
     bench = Bench(DAMIAO)
     bench.enter()
-    assert not bench.answer(codec.LOST_COMMANDS).closed_loop
-    assert bench.axis.health.watchdog_expired
+    assert not bench.answer(status).closed_loop
+    assert bench.axis.health.watchdog_expired is (status == codec.LOST_COMMANDS)
     bench.axis.send_torque(0.0)
     assert bench.last == codec.LEAVE
+
+
+@pytest.mark.parametrize("model", [CUBEMARS, ROBSTRIDE])
+def test_a_drive_that_has_restarted_follows_no_torque_and_has_to_report_its_faults_again(model: str) -> None:
+    bench = Bench(model)
+    bench.enter()
+    if model == ROBSTRIDE:
+        bench.hear(0, codec.encode_faults(NODE, 0))
+    assert bench.axis.health.firmware_supported
+    for _ in range(round(0.4 / TICK_S)):  # it does not answer
+        bench.axis.send_torque(0.1)
+        bench.read()
+    assert not bench.answer().closed_loop
+    assert bench.axis.health.restarts == 1
+    assert bench.axis.health.firmware_supported is (model == CUBEMARS)
+
+
+def test_a_robstride_that_answers_the_question_for_faults_alone_has_not_restarted() -> None:
+    bench = Bench(ROBSTRIDE)
+    bench.enter()
+    for _ in range(round(0.4 / TICK_S)):
+        bench.axis.request_supply()
+        bench.hear(0, codec.encode_faults(NODE, 0))
+    assert bench.answer().closed_loop
+    assert bench.axis.health.restarts == 0
 
 
 @pytest.mark.parametrize(
@@ -152,6 +198,7 @@ def test_a_fault_that_a_robstride_reports_when_asked_ends_the_mode_until_it_is_c
     bench.enter()
     for node, faults in ((NODE + 1, 0x10), (NODE, 0)):  # another drive's, and none
         assert not bench.axis.health.firmware_supported  # a drive of another maker would follow the question
+        assert "faults" in bench.axis.health.supported_firmware
         bench.hear(master, codec.encode_faults(node, faults))
         assert bench.answer().closed_loop
     assert bench.axis.health.firmware_supported
@@ -241,10 +288,14 @@ def test_torque_that_stays_away_is_not_another_program_s() -> None:
     assert bench.axis.health.setpoint_problem == ""
 
 
-def test_answers_to_the_commands_of_another_program_are_no_second_drive_s() -> None:
+@pytest.mark.parametrize(
+    ("identifier", "data"),
+    [(NODE, codec.LEAVE), (codec.REGISTER_ID, codec.encode_register(NODE, codec.STATE, 0, bytes(4)))],
+)
+def test_answers_to_the_questions_of_another_program_are_no_second_drive_s(identifier: int, data: bytes) -> None:
     bench = Bench(DAMIAO)
     for _ in range(20):
-        bench.hear(NODE, codec.LEAVE)
+        bench.hear(identifier, data)
         bench.answer()
     assert not bench.axis.health.duplicate_id
 
@@ -281,7 +332,7 @@ def test_the_registers_of_a_damiao_are_asked_for_and_their_answers_are_no_motion
     sent = len(bench.sent)
     bench.axis.request_settings(bench.now_s)  # the answer is awaited
     assert len(bench.sent) == sent
-    assert bench.axis.health.setting_problem == ""
+    assert bench.axis.health.setting_problem == "" and "register" in bench.axis.health.supported_firmware
     other_range = codec.encode_register(NODE, codec.READ, PMAX, struct.pack("<f", 99.0))
     bench.hear(codec.feedback_id(NODE, bench.model), other_range)
     assert "PMAX" in bench.axis.health.setting_problem
