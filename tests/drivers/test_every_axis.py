@@ -52,6 +52,18 @@ def test_a_torque_of_another_program_is_counted_for_its_drive(name: str) -> None
     assert [axis.health.foreign_commands for axis in drives.drives.axes] == [1, 0, 0, 0]
 
 
+@each_type
+def test_a_drive_that_follows_other_torques_than_the_commanded_ones_is_noticed_by_what_it_reports(name: str) -> None:
+    drives = DrivenDrives(name, {"current_noise_a": 0.01})
+    drives.arm()
+    for tick in range(200):
+        drives.tick(0.1)
+        if tick % 2:  # a command that does not pass over the bus, as on the drive's serial line
+            drives.devices[0].receive(drives.devices[0].forge_torque(-0.4), drives.now_s)
+            drives.wait(TICK_S)
+    assert [axis.health.setpoint_problem != "" for axis in drives.drives.axes] == [True, False, False, False]
+
+
 SUPPLIED_A = 0.1 * 0.1 / 0.083  # as the simulated drives take for 0.1 N·m
 LESS_REPORTED = {"mit": (23.0, None), "mit:AK80-9": (None, None), "mit:RS05": (None, None)}  # voltage and current
 

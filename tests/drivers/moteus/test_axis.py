@@ -140,6 +140,37 @@ def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
     assert bench.health.errors == "" and not bench.health.watchdog_expired
 
 
+def test_an_error_of_an_idle_drive_is_cleared_by_a_stop_and_forgotten_when_it_is_armed() -> None:
+    bench = Bench()
+    bench.tick(count=20)
+    for commands in ([bench.drives.clear_errors], [bench.axis.disarm, bench.axis.close_loop]):
+        bench.devices[0].trip(DriveError.WATCHDOG)
+        bench.tick(count=4)
+        assert bench.health.errors == "watchdog expired"
+        for command in commands:
+            command()
+        bench.tick(count=4)
+        assert bench.device.mode is not Mode.TIMEOUT and bench.health.errors == ""
+
+
+def test_a_disarmed_drive_gets_no_torque_command_also_of_zero() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.disarm()
+    bench.tick(count=20)
+    assert bench.device.mode is Mode.STOPPED and bench.drives.refused_commands == 0
+
+
+@pytest.mark.parametrize("torque_nm", [1e39, -1e39, nan])
+def test_a_torque_that_no_binary32_represents_becomes_zero(torque_nm: float) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.tick(0.2)
+    bench.tick(torque_nm)
+    bench.exchange()
+    assert bench.torque_nm() == 0.0 and bench.drives.refused_commands == 4
+
+
 def test_settings_are_read_back_and_again_after_a_change() -> None:
     bench = Bench(serial_number="0123456789abcdef00112233")
     bench.tick(None, count=380)
