@@ -149,7 +149,8 @@ class MotionMonitor:
         step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
         measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
         if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
-            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, braked)
+            lead_rad_s = UNKNOWN if target is None else target.velocity_rad_s
+            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad, lead_rad_s, braked)
         self._impulse_nm_s = self._elapsed_s = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
         self._target_rad, self._error_rad = target_rad, target_rad - angle_rad
@@ -158,8 +159,19 @@ class MotionMonitor:
         if not following or not explained or self.away_rad > AWAY_RAD or self._shaken >= SHAKEN:
             self._report(found, target)
 
-    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float, braked: bool) -> None:
-        """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
+    def _add(
+        self,
+        elapsed_s: float,
+        step_rad: float,
+        velocity_rad_s: float,
+        target_rad: float,
+        lead_rad_s: float,
+        braked: bool,
+    ) -> None:
+        """Add a sample to the energy, and to the path away where the joint had a target and still has one.
+
+        `lead_rad_s`: the target's velocity. A target that jumps, as where another path begins, does not lead.
+        """
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
@@ -181,7 +193,7 @@ class MotionMonitor:
             self._pressed_s = self._back_rad = 0.0
             self.driven_back = self.driven_back if pulls else 0
         else:
-            self._watch_pressing(elapsed_s, step_rad, torque_nm, target_step_rad)
+            self._watch_pressing(elapsed_s, step_rad, torque_nm, lead_rad_s * elapsed_s)
         work_j = torque_nm * step_rad
         leak_s = RESTING_LEAK_S if resting else RUNAWAY_LEAK_S
         unexplained_j = (1.0 - elapsed_s / leak_s) * self.unexplained_j + kinetic_j - work_j
@@ -207,9 +219,9 @@ class MotionMonitor:
         if lag_rad > self._excursion_rad:
             self._excursion_rad = lag_rad
 
-    def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
+    def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, lead_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
-        back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
+        back_rad, target_back_rad = (-step_rad, -lead_rad) if torque_nm > 0.0 else (step_rad, lead_rad)
         near_limit_nm = self._near_limit_nm - PROBE_NM if self.probed else self._near_limit_nm
         leads = target_back_rad > 0.0 and abs(torque_nm) < near_limit_nm
         self._pressed_s += elapsed_s

@@ -530,6 +530,14 @@ def test_a_joint_whose_speed_changes_in_its_probe_or_after_it_is_healthy(rates_r
     assert joint.monitor.driven_back < 3
 
 
+def test_a_target_that_jumps_to_the_joint_does_not_end_its_probe() -> None:
+    """As where a stop is requested: the path to a raised flipper begins at the measured angle."""
+    joint = PushedJoint()
+    joint.push(0.7, -0.3, 1 + 3 * 31)
+    assert joint.push(0.575, -0.3, 13) is None
+    assert joint.push(0.1, -0.3, 100, target_rad=joint.angle_rad) == 13 + 26
+
+
 def test_the_probe_of_a_joint_that_hardly_presses_counts_too() -> None:
     joint = PushedJoint()
     joint.push(0.3, -0.3, 1 + 3 * 31)
@@ -558,11 +566,11 @@ class PushedJoint(Samples):
 
     angle_rad = 0.0
 
-    def push(self, torque_nm: float, velocity_rad_s: float, samples: int) -> int | None:
+    def push(self, torque_nm: float, velocity_rad_s: float, samples: int, target_rad: float = 0.0) -> int | None:
         """Return the number of the sample in which it is driven back, if any."""
         for number in range(1, samples + 1):
             self.angle_rad += velocity_rad_s / 512.0
-            if "joint_driven_back" in self.add(self.angle_rad, velocity_rad_s, 0.0, 1.0 / 512.0, torque_nm):
+            if "joint_driven_back" in self.add(self.angle_rad, velocity_rad_s, target_rad, 1.0 / 512.0, torque_nm):
                 return number
         return None
 
