@@ -17,6 +17,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
 from experiments.reports.style import save_picture
 from experiments.reports.text_tables import table, value_shown
+from experiments.reports.validity_text import why_not_valid
 from experiments.study.option import Option
 from experiments.study.values import picture
 from firmware_host.configuration.configuration import CaptureAxis
@@ -58,6 +59,7 @@ def replay(
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
         lines.append(f"{stride_line(report, replayed.begin_s)}  {forces}{other_surface(report)}")
+    lines += why_not_valid(strides)
     if not strides:
         complain("no complete stride in this log")
     if replayed.segment:

@@ -19,6 +19,7 @@ from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
+from experiments.reports.validity_text import why_not_valid
 from experiments.reports.value_text import N_CM3, coefficient_text, value_text
 from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds
 from experiments.run_report.results import (
@@ -120,7 +121,8 @@ def run_result(run: Run, headline: Entry) -> Result:
             texts["Left and right"] = "The difference has the errors of both, since each flipper has motors of its own."
             tables.append(_table("Left and right", _flipper_rows(headline)))
     if len(run.strides):
-        texts["Strides"] = f"{SINCE} Brackets mark an invalid value, ≥ a lower bound."
+        notes = [SINCE, "Brackets mark an invalid value, ≥ a lower bound."]
+        texts["Strides"] = " ".join([*notes, *why_not_valid(map(stride_report, run.replay.strides))])
         tables.append(_table("Strides", stride_rows(run)))
         tables += [_table("Strides", estimate_rows(run, name), f"{name} by stride") for name in COEFFICIENTS]
     if run.supply:
