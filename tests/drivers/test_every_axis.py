@@ -53,13 +53,16 @@ def test_a_torque_of_another_program_is_counted_for_its_drive(name: str) -> None
 
 
 @each_type
-def test_a_drive_that_follows_other_torques_than_the_commanded_ones_is_noticed_by_what_it_reports(name: str) -> None:
+@pytest.mark.parametrize("other_nm", [-0.4, 0.0])
+def test_a_drive_that_follows_other_torques_than_the_commanded_ones_is_noticed_by_what_it_reports(
+    name: str, other_nm: float
+) -> None:
     drives = DrivenDrives(name, {"current_noise_a": 0.01})
     drives.arm()
     for tick in range(200):
-        drives.tick(0.1)
+        drives.tick(0.2)
         if tick % 2:  # a command that does not pass over the bus, as on the drive's serial line
-            drives.devices[0].receive(drives.devices[0].forge_torque(-0.4), drives.now_s)
+            drives.devices[0].receive(drives.devices[0].forge_torque(other_nm), drives.now_s)
             drives.wait(TICK_S)
     assert [axis.health.setpoint_problem != "" for axis in drives.drives.axes] == [True, False, False, False]
 

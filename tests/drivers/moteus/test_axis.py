@@ -13,6 +13,7 @@ from drivers.odrive.drive_type import Odrive
 from simulation.devices.drive import DriveError
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.moteus.forgeries import answer_frame, command_frame
+from tests.drivers.bench.simulated_bus import simulated
 from tests.simulation.devices.driven_drives import TICK_S, DrivenDrives
 
 
@@ -46,6 +47,14 @@ class Bench(DrivenDrives):
         return self.drives.health[0]
 
 
+def test_the_first_answer_has_the_time_at_which_it_is_read() -> None:
+    bench = Bench()
+    bench.drives.poll()
+    bench.exchange()
+    state = bench.drives.read(bench.now_s)[0]
+    assert state.heard and state.angle_stamp_s == state.current_stamp_s == bench.now_s
+
+
 def test_a_drive_that_restarts_under_torque_is_not_commanded_back_into_it() -> None:
     bench = Bench()
     bench.arm()
@@ -72,6 +81,14 @@ def test_an_idle_drive_that_another_program_starts_again_and_again_is_stopped_in
     bench.tick(count=43)
     heard = [frame.data for frame in bench.far.receive() if frame.arbitration_id == codec.command_id(1)]
     assert heard == [codec.QUERY_ALONE] and not bench.devices[0].energised
+
+
+def test_an_idle_drive_is_stopped_in_the_tick_that_hears_a_command_of_another_program() -> None:
+    bench = Bench()
+    bench.tick(count=20)
+    bench.other_program.send(command_frame(1, codec.encode_torque(0.3)))
+    bench.tick()
+    assert [frame.data for frame in bench.far.receive()][0] == codec.STOP_AND_QUERY
 
 
 def test_a_drive_that_alternates_between_stops_and_torque_counts_as_in_closed_loop() -> None:
@@ -113,6 +130,23 @@ def test_an_answer_without_a_stamp_is_as_old_as_its_question() -> None:
     assert state.angle_stamp_s == state.current_stamp_s == bench.now_s
 
 
+def test_questions_of_others_for_other_registers_hide_no_second_drive() -> None:
+    bench = Bench()
+    bench.devices.append(simulated("moteus", 1))
+    for _ in range(400):
+        bench.other_program.send(command_frame(1, registers.padded(codec.POWER_QUERY)))
+        bench.tick()
+    assert bench.health.duplicate_id
+
+
+def test_a_register_that_another_program_sets_to_zero_is_its_command() -> None:
+    bench = Bench()
+    zero = registers.encode_values(registers.WRITE, Resolution.INT8, Register.WATCHDOG, [0.0])
+    bench.other_program.send(command_frame(1, registers.padded(zero)))
+    bench.tick()
+    assert bench.health.foreign_commands == 1
+
+
 @pytest.mark.parametrize("data", [codec.QUERY_ALONE, codec.STOP_AND_QUERY, codec.STOP])
 def test_questions_and_stops_of_others_are_no_foreign_commands(data: bytes) -> None:
     bench = Bench()
@@ -138,6 +172,13 @@ def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
     bench.drives.clear_errors()
     bench.tick(count=8)
     assert bench.health.errors == "" and not bench.health.watchdog_expired
+
+
+def test_a_supply_that_is_too_low_is_a_cut_of_the_power() -> None:
+    bench = Bench()
+    bench.device.mode, bench.device.fault = Mode.FAULT, codec.UNDER_VOLTAGE
+    bench.tick(count=4)
+    assert [health.power_cut for health in bench.drives.health] == [True, False, False, False]
 
 
 def test_an_error_of_an_idle_drive_is_cleared_by_a_stop_and_forgotten_when_it_is_armed() -> None:
