@@ -176,6 +176,7 @@ SUBJECTS = (
             "Lt to LtE in `NEVER_S < asked_s < now_s`": SAME,
             "always in `if self.closed_loop:`": "what an idle drive measures is forgotten with its answer",
             "always in `if flags != self._error_flags:`": SPEED,
+            "without `return` in `if register == SUPPLY_V:`": "the settings only store it, and no check reads it",
         },
     ),
     Subject(

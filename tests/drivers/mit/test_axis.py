@@ -281,6 +281,14 @@ def test_a_torque_that_was_not_commanded_again_and_again_is_another_program_s() 
     assert bench.axis.health.setpoint_problem == ""
 
 
+@pytest.mark.parametrize(("measured_nm", "differs"), [(0.05, False), (0.06, True)])
+def test_a_torque_differs_by_more_than_the_tolerance_and_a_step_of_its_code(measured_nm: float, differs: bool) -> None:
+    bench = Bench(DAMIAO)
+    bench.enter()
+    run_following(bench, 0.0, measured_nm)
+    assert (bench.axis.health.setpoint_problem != "") is differs
+
+
 def test_torque_that_stays_away_is_not_another_program_s() -> None:
     bench = Bench(DAMIAO)
     bench.enter()
