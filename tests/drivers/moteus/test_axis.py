@@ -107,8 +107,10 @@ def test_an_idle_drive_that_another_program_gives_torque_in_another_mode_is_stop
     bench = Bench()
     bench.tick(count=20)
     bench.device.mode = mode
+    bench.tick()
+    assert bench.health.busy_state == f"mode {mode}"
     bench.tick(count=20)
-    assert bench.device.mode is Mode.STOPPED
+    assert bench.device.mode is Mode.STOPPED and bench.health.busy_state == ""
 
 
 def test_a_latched_watchdog_is_not_cleared_by_the_stops_of_a_disturbed_drive() -> None:
