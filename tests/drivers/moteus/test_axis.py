@@ -270,6 +270,15 @@ def test_a_signal_that_a_drive_does_not_know_keeps_its_old_stamp() -> None:
         bench.tick(count=2)
 
 
+def test_a_commanded_torque_that_an_idle_drive_reports_is_no_other_program_s() -> None:
+    bench = Bench()
+    bench.tick(count=20)
+    reply = codec.decode_reply(bench.devices[0].receive(command_frame(1, codec.QUERY_ALONE), 0.0)[0].data)
+    data = codec.encode_reply(reply._replace(control_torque_nm=50.0))
+    bench.axis.receivers[codec.reply_id(1) | FD](data, bench.now_s)
+    assert bench.health.setpoint_problem == ""
+
+
 @pytest.mark.parametrize("register", [Register.REGISTER_MAP, Register.SERIAL_NUMBER])
 def test_a_setting_that_a_drive_does_not_know_stays_unknown(register: Register) -> None:
     bench = Bench()
