@@ -16,6 +16,7 @@ class Subject(NamedTuple):
 
 A_TEXT = "a text of the diagram"
 CONTINUOUS = "it has the same value there from both sides"
+ONE_EACH = "each of them has one value for each joint"
 NO_NUMBER = "neither of them is finite either"
 MORE_OFTEN = "the same counters are only read more often"
 ROUNDED = "a sum of such times never is exactly the bound"
@@ -53,7 +54,7 @@ SUBJECTS = (
         "control.limits",
         ("control/test_limits.py",),
         equivalent={
-            "True to False in `strict=True`": "each of them has one value for each joint",
+            "True to False in `strict=True`": ONE_EACH,
             "to Sub in `wanted + state.angle_rad`": NO_NUMBER,
             "to Sub in `wanted + state.angle_rad + state.velocity_rad_s`": NO_NUMBER,
             "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
@@ -189,7 +190,15 @@ SUBJECTS = (
     ),
     Subject("drivers.odrive.axis", ("drivers/odrive/test_axis.py", "drivers/test_every_axis.py")),
     Subject("drivers.odrive05.axis", ("drivers/odrive05/test_axis.py", "drivers/test_every_axis.py")),
-    Subject("drivers.drives", ("drivers/odrive/test_drives.py", "drivers/test_every_axis.py")),
+    Subject(
+        "drivers.drives",
+        ("drivers/odrive/test_drives.py", "drivers/test_every_axis.py"),
+        equivalent={
+            "Lt to LtE in `now_s - self._disarmed_s < REPEAT_S`": ROUNDED,
+            "True to False in `strict=True`": ONE_EACH,
+            "Lt to LtE in `now_s - self._armed_s < REPEAT_S`": ROUNDED,
+        },
+    ),
     Subject("control.joint_pd", ("control/test_velocity_prediction.py", "control/test_joint_pd.py")),
     Subject("control.controller", ("control/test_controller.py",)),
     Subject("firmware_host.fault_monitor", ("firmware_host/test_fault_monitor.py",), has_fixtures=True),

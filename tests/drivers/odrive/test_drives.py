@@ -2,6 +2,7 @@
 
 from math import inf, nan, pi
 from struct import pack
+from unittest.mock import Mock
 
 import pytest
 
@@ -168,6 +169,34 @@ def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
     }
 
 
+def test_a_refused_torque_is_counted_with_the_reason(bench: Bench) -> None:
+    bench.drives.send(Joints(0.1, 0.0, 0.0, 0.0), PERIOD_S)
+    assert bench.drives.refused_commands == 1 and "armed" in bench.drives.last_refusal
+
+
+def test_one_joint_may_get_another_torque_within_the_step_of_the_last_ones() -> None:
+    bench = Bench(limits=BOUNDLESS)
+    bench.drives.gate.open()
+    bench.drives.send(Joints(0.0, 0.0, 0.0, 0.0), PERIOD_S)
+    bench.sent()
+    bench.drives.send_torque("right_sweep", -1.0)
+    assert bench.sent() == {"left": [], "right": [Frame(0x06E, bytes.fromhex("0000803f"))]}
+
+
+def test_older_torques_are_another_program_s_but_not_while_the_bus_refuses_newer_ones() -> None:
+    bench = Bench(limits=BOUNDLESS)
+    bench.heartbeat(8)
+    bench.drives.read(1.0)
+    bench.drives.gate.open()
+    for torque_nm, is_full, differs in ((0.3, False, False), (0.6, True, False), (0.6, False, True)):
+        bench.drives.ports["left"].full = is_full  # type: ignore[attr-defined]
+        for tick in range(20):
+            bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0), PERIOD_S)
+            bench.report(GET_IQ, 0.3 / 0.083, 0.3 / 0.083)
+            bench.drives.read(1.0 + tick * PERIOD_S)
+        assert (bench.health.setpoint_problem != "") is differs
+
+
 def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
     bench.drives.arm(1.0)
@@ -221,6 +250,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
     bench.drives.arm(1.0)
     bench.sent()
     bench.drives.disarm(1.0, at_once=True)
+    assert not bench.drives.gate.is_open
     assert bench.sent() == {
         "left": [Frame(0x00E, bytes(4)), Frame(0x007, b"\1\0\0\0"), Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")],
         "right": [Frame(0x06E, bytes(4)), Frame(0x067, b"\1\0\0\0"), Frame(0x04E, bytes(4)), Frame(0x047, b"\1\0\0\0")],
@@ -253,6 +283,32 @@ def test_disarming_that_the_bus_refused_is_repeated_for_any_report_of_the_drives
     assert [frame.arbitration_id for frame in bench.sent()["left"]] == [0x00E, 0x007, 0x02E, 0x027]
     bench.drives.disarm(1.02 + 2.0 * REPEAT_S)
     assert bench.silent()
+
+
+def test_forcing_idle_closes_the_gate_and_reaches_the_drives_of_a_bus_next_to_one_that_raises(bench: Bench) -> None:
+    bench.drives.gate.open()
+    bench.drives.ports["left"].send = Mock(side_effect=OSError)  # type: ignore[method-assign]
+    bench.drives.force_idle(3)
+    zero_and_idle = [
+        Frame(0x06E, bytes(4)), Frame(0x067, b"\1\0\0\0"), Frame(0x04E, bytes(4)), Frame(0x047, b"\1\0\0\0"),
+    ]  # fmt: skip
+    assert bench.sent() == {"left": [], "right": 3 * zero_and_idle}
+    assert not bench.drives.gate.is_open
+
+
+def test_the_drives_are_asked_for_their_supply_one_after_the_other_every_tenth_tick(bench: Bench) -> None:
+    bench.drives.read(1.0)
+    asked = []
+    for tick in range(1, 51):
+        bench.drives.request_supply()
+        asked += [(tick, frame.arbitration_id) for frames in bench.sent().values() for frame in frames]
+    assert asked == [(10, 0x037), (20, 0x077), (30, 0x057), (40, 0x017), (50, 0x037)]
+
+
+def test_closed_drives_hear_nothing_any_more(bench: Bench) -> None:
+    bench.drives.close()
+    bench.report_everything(1.0)
+    assert not bench.drives.heard
 
 
 def test_errors_are_cleared_on_all_drives(bench: Bench) -> None:
