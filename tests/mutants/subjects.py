@@ -192,7 +192,7 @@ SUBJECTS = (
     Subject("drivers.odrive05.axis", ("drivers/odrive05/test_axis.py", "drivers/test_every_axis.py")),
     Subject(
         "drivers.drives",
-        ("drivers/odrive/test_drives.py", "drivers/test_every_axis.py"),
+        ("drivers/odrive/test_drives.py", "drivers/moteus/test_axis.py", "drivers/test_every_axis.py"),
         equivalent={
             "Lt to LtE in `now_s - self._disarmed_s < REPEAT_S`": ROUNDED,
             "True to False in `strict=True`": ONE_EACH,
