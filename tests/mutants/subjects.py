@@ -195,6 +195,10 @@ SUBJECTS = (
         ("drivers/odrive/test_drives.py", "drivers/moteus/test_axis.py", "drivers/test_every_axis.py"),
         equivalent={
             "Lt to LtE in `now_s - self._disarmed_s < REPEAT_S`": ROUNDED,
+            "LtE to Lt in `0.0 <= now_s - stamp_s < LONGEST_IN_QUEUE_S`": SAME,
+            "never in `if not self._other_protocols:`": SPEED,
+            "without `if not self._other_protocols:` in `@property`": SPEED,
+            "without `return health` in `if not self._other_protocols:`": SPEED,
             "True to False in `strict=True`": ONE_EACH,
             "Lt to LtE in `now_s - self._armed_s < REPEAT_S`": ROUNDED,
         },
