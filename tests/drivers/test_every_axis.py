@@ -4,6 +4,9 @@ from math import isnan
 
 import pytest
 
+from drivers.can.frames import Frame
+from drivers.mit import codec
+from drivers.mit.settings import PMAX
 from tests.drivers.bench.simulated_bus import simulated
 from tests.simulation.devices.driven_drives import TICK_S, TYPES, DrivenDrives
 
@@ -48,6 +51,14 @@ def test_a_torque_of_another_program_is_counted_for_its_drive(name: str) -> None
     drives = DrivenDrives(name)
     drives.tick(count=400)
     drives.far.send(drives.devices[0].forge_torque(0.1))
+    drives.tick()
+    assert [axis.health.foreign_commands for axis in drives.drives.axes] == [1, 0, 0, 0]
+
+
+def test_a_register_that_another_program_writes_is_counted_for_its_drive() -> None:
+    """It has the largest of all standard ids."""
+    drives = DrivenDrives("mit")
+    drives.far.send(Frame(codec.REGISTER_ID, codec.encode_register(1, codec.WRITE, PMAX, bytes(4))))
     drives.tick()
     assert [axis.health.foreign_commands for axis in drives.drives.axes] == [1, 0, 0, 0]
 

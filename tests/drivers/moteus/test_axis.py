@@ -302,3 +302,5 @@ def test_an_odrive_under_the_id_of_a_moteus_is_noticed() -> None:
     bench.tick()
     assert bench.health.other_protocol == "odrive" and not bench.drives.heard
     assert bench.drives.health[1].other_protocol == ""
+    bench.drives.reset()
+    assert bench.health.other_protocol == ""
