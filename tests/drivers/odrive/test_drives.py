@@ -76,6 +76,13 @@ def test_the_newest_measured_current_counts_and_the_zero_is_subtracted_before_th
     assert bench.silent()  # reading transmits nothing
 
 
+def test_each_port_is_told_to_listen_to_its_own_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes: list[set[int]] = []
+    monkeypatch.setattr(MockPort, "listen_to", lambda port, ids: nodes.append({number >> 5 for number in ids}))
+    Bench()
+    assert nodes == [{0, 1}, {2, 3}]
+
+
 def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
     for now_s, (message, values) in enumerate(SIGNALS, start=1):
         bench.report(message, *values)
