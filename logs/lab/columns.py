@@ -6,6 +6,7 @@ JOINT_COLUMNS = ("leftsweeping", "leftadduction", "rightsweeping", "rightadducti
 WRITTEN_ORDER = (1, 0, 3, 2)  # the authors put adduction first
 POSITION_COLUMNS = tuple(f"{joint}_pos" for joint in JOINT_COLUMNS)  # turns
 CURRENT_COLUMNS = tuple(f"{joint}_curr" for joint in JOINT_COLUMNS)  # A
+BACKWARD = "backward"  # setting of a walk whose stances sweep forward; 1 where this project wrote it
 DEPTH_COLUMN = "insertiondepth"  # commanded, m; not in every log
 BODY_COLUMNS = ("OptitrackPosition_x", "OptitrackPosition_y", "OptitrackPosition_z")
 ORIENTATION_COLUMNS = tuple(f"OptitrackOrientation_{part}" for part in "xyzw")

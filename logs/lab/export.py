@@ -12,6 +12,7 @@ from logs.files.log_error import LogError, Watch, unwatched
 from logs.files.log_reader import AnyLog, watched_blocks
 from logs.files.tick_array import Ticks
 from logs.lab.columns import (
+    BACKWARD,
     BODY_COLUMNS,
     DEPTH_COLUMN,
     JOINT_COLUMNS,
@@ -27,8 +28,7 @@ def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> None:
 
     Raises LogError.
     """
-    depth_m, has_position = _read_ahead(log)
-    settings = {"scenario": "mudskipper"} | ({} if depth_m is None else {"insertion_angle": f"{depth_m:.9g}"})
+    settings, has_position = _read_ahead(log)
     settings |= {name: str(value) for name, value in _gait_of(log).items() if isinstance(value, int | float)}
     out.write(f"{','.join(settings)}\n{','.join(settings.values())}\n")
     start_s = log.ends["stamp_s"][:1]
@@ -48,17 +48,19 @@ def _gait_of(log: AnyLog) -> dict[str, Any]:
     return gait
 
 
-def _read_ahead(log: AnyLog) -> tuple[float | None, bool]:
-    """Return the depth of the first stride, and whether there is any position; reads as far as it must."""
-    depth_m, has_position = None, False
+def _read_ahead(log: AnyLog) -> tuple[dict[str, str], bool]:
+    """Return the settings of the walk, and whether there is any position."""
+    settings, has_position, swept_rad = {"scenario": "mudskipper"}, False, 0.0
+    sweeps = [number for number, joint in enumerate(log.rig.joints) if joint.endswith("_sweep")]
     for ticks in log.blocks():
         inserted = ticks["phase"] == Phase.INSERTION
-        if depth_m is None and np.any(inserted):
-            depth_m = float(ticks["stride_depth_m"][inserted][0])
+        if np.any(inserted):
+            settings.setdefault("insertion_angle", f"{ticks['stride_depth_m'][inserted][0]:.9g}")
         has_position = has_position or bool(np.any(np.isfinite(ticks["body_x_m"])))
-        if has_position and depth_m is not None:
-            break
-    return depth_m, has_position
+        pushes = np.isin(ticks["phase"], (Phase.STANCE, Phase.STROKE))
+        steps_rad = np.diff(ticks["angle_rad"][:, sweeps], axis=0)
+        swept_rad += float(np.nansum(steps_rad[pushes[1:] & pushes[:-1]]))
+    return settings | ({BACKWARD: "1"} if swept_rad > 0.0 else {}), has_position
 
 
 def _columns(ticks: Ticks, rig: Rig, start_s: Floats, has_position: bool) -> dict[str, Floats]:

@@ -18,6 +18,7 @@ from firmware_host.configuration.configuration import CaptureAxis
 from logs.files.log_error import LogError
 from logs.lab.body_track import VERTICAL_AXIS, read_body_track
 from logs.lab.columns import (
+    BACKWARD,
     CURRENT_COLUMNS,
     DEPTH_COLUMN,
     PHASE_OF_STATE,
@@ -103,6 +104,10 @@ def read_lab_csv(
     orient(rows, angle_rad, current_a)
     check_zero(rows, geometry, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
     track = read_body_track(rows, table, vertical)
+    if table.gait.get(BACKWARD, 0.0) > 0.0:  # all signs above are those of a walk forward
+        angle_rad[:, ::2] *= -1.0
+        current_a[:, ::2] *= -1.0
+        track = track._replace(advance_m=-track.advance_m, pitch_rad=-track.pitch_rad)
     return LabLog(
         stamp_s=rows.time_s,
         phase=rows.phase,

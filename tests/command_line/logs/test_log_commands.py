@@ -20,6 +20,8 @@ from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 from logs.files.log_reader import read_log
+from logs.lab.export import write_lab_csv
+from logs.lab.lab_csv import read_lab_csv
 from tests.command_line.command_lines import json_of, output, refusal, run, run_process
 from tests.recorded_walks import record_walks
 
@@ -61,6 +63,22 @@ def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> Non
     for one, other in zip(ours, theirs, strict=True):
         assert other["k_s"]["value"] == pytest.approx(one["k_s"]["value"], rel=0.1)
         assert other["stance_force_n"] == pytest.approx(one["stance_force_n"], abs=0.5)
+
+
+def test_an_exported_walk_backward_reads_back_as_one(walk: Path, tmp_path: Path) -> None:
+    """The authors' columns have no signs of their own: a setting tells it from the walk forward that mirrors it."""
+    log, path = read_log(walk), tmp_path / "walk.csv"
+    mirrored = log.ticks.copy()
+    for name in ("angle_rad", "current_a"):
+        mirrored[name][:, ::2] *= -1.0
+    mirrored["body_x_m"] *= -1.0
+    with path.open("w", encoding="utf-8") as file:
+        write_lab_csv(log._replace(ticks=mirrored), file)
+    output("log", "export", str(walk), "--csv", "--out", str(tmp_path / "forward.csv"))
+    forward, backward = read_lab_csv(tmp_path / "forward.csv"), read_lab_csv(path)
+    assert np.allclose(backward.angle_rad, forward.angle_rad * [-1, 1, -1, 1], equal_nan=True)
+    assert np.allclose(backward.current_a, forward.current_a * [-1, 1, -1, 1], equal_nan=True)
+    assert np.allclose(backward.body_x_m, -forward.body_x_m, equal_nan=True)
 
 
 @pytest.fixture(scope="module")
