@@ -22,6 +22,10 @@ class ConfigurationError(Exception):
         self.problems = [_readable(problem) for problem in problems]
         super().__init__("\n".join(self.problems))
 
+    def of(self, file: object) -> "ConfigurationError":
+        """Return the same problems, each with the name of the file."""
+        return ConfigurationError([f"{file}: {problem}" for problem in self.problems])
+
 
 class UnreadableFileError(ConfigurationError):
     """The operating system does not give the file: it is missing, a folder, or another user's."""

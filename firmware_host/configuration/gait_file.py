@@ -39,8 +39,7 @@ def read_gait(document: dict[str, Any]) -> GaitPath:
     try:
         return GaitPath(**_READER.read(document))
     except ConfigurationError as problem:
-        name = document.get("name") or "gait"
-        raise ConfigurationError([f"{name}: {each}" for each in problem.problems]) from None
+        raise problem.of(document.get("name") or "gait") from None
 
 
 def as_json(document: dict[str, Any]) -> str:

@@ -127,8 +127,12 @@ def load_world(path: Path) -> World:
 
 
 def parse_world(text: str, file: Path | None = None) -> World:
-    """Read a world. Raises ConfigurationError."""
-    return read_world(parse_document(text, file))
+    """Read a world. Raises ConfigurationError, which names the file."""
+    document = parse_document(text, file)
+    try:
+        return read_world(document)
+    except ConfigurationError as problem:
+        raise problem.of(file) if file else problem from None
 
 
 def read_world(document: dict[str, Any]) -> World:

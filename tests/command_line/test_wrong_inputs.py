@@ -185,7 +185,7 @@ WRONG_CONFIGURATIONS += [
     )
 ]
 WRONG_CONFIGURATIONS += [
-    *((f"{command} --world world.toml", "segment 1.strength_pa = -1") for command in ("simulate", "demo")),
+    *((f"{command} --world world.toml", "world.toml: segment 1.strength_pa = -1") for command in ("simulate", "demo")),
     ("init - --set drop_m=0.07", "geometry.axis_height_m"),
     ("init - --set drop_m=0.6", "geometry.drop_m = 0.6: must be at most 0.5"),
     ("init - --node left_sweep=1 --node right_sweep=1", "has the same on bus"),

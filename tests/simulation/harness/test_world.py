@@ -136,8 +136,8 @@ def test_wrong_values_are_reported_together_and_then_all_contradictions() -> Non
         assert sorted(reported.split(":")[0].split(" = ")[0] for reported in problems_of(wrong)) == expected
 
 
-@pytest.mark.parametrize("contents", [None, b"\xff\xfe", b"[[segment]\n"])
-def test_a_file_that_is_no_world_is_reported_by_its_name(tmp_path: Path, contents: bytes | None) -> None:
+@pytest.mark.parametrize("contents", [None, b"\xff\xfe", b"[[segment]\n", b"segment = 3\n"])
+def test_what_is_wrong_with_a_file_is_reported_with_its_name(tmp_path: Path, contents: bytes | None) -> None:
     path = tmp_path / "world.toml"
     if contents is not None:
         path.write_bytes(contents)
