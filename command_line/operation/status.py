@@ -42,11 +42,19 @@ def status_text(report: Report) -> str:
     parts += [(f"warning: {notice}\n", WARNING) for notice in notices(report)]
     drives = [{head: cell for head, (cell, _) in drive_cells(drive).items()} for drive in report["drives"]]
     parts.append((f"\n{table([list(drives[0]), *(list(drive.values()) for drive in drives)])}\n", ""))
-    for name, (text, style) in machine_lines(report):
+    for name, (text, style) in [*machine_lines(report), *_ground_lines(report)]:
         parts += [(f"\n{name:7}", ""), (text, style)]
     if (log := report["log"])["path"]:
         parts.append((f"\nquota  {quota_text(log['quota_bytes'], log['min_free_fraction'])}", ""))
     return plain(parts)
+
+
+def _ground_lines(report: Report) -> list[tuple[str, Part]]:
+    """Return which law the ground follows, once strides show it."""
+    law = report["mud"]["law"]
+    wrong = law and " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law["errors"].items())
+    text = law and f"{law['name']}: each coefficient is predicted wrong from the others, as {wrong}"
+    return [("ground", (text, ""))] if text else []
 
 
 def _cause_lines(cause: Report) -> str:

@@ -74,6 +74,14 @@ def test_a_cut_of_the_power_takes_the_place_of_the_mode(history: History, capsys
     assert capsys.readouterr().out.startswith("power cut, ")
 
 
+def test_status_says_which_law_the_ground_follows_and_by_how_much(history: History) -> None:
+    history.status["mud"]["law"] = {"name": "undecided", "errors": {"mud": 0.364, "sand": 1.22}}
+    shown = "ground undecided: each coefficient is predicted wrong from the others, as mud by 36 % and sand by 122 %"
+    assert shown in status_text(history.status)
+    history.status["mud"]["law"] = None  # nothing is known yet
+    assert "\nground" not in status_text(history.status)
+
+
 def test_a_silent_drive_has_unknown_torque(history: History) -> None:
     history.status["drives"] = [
         drive | {"angle_age_s": 1.6, "heartbeat_age_s": 1.6} for drive in history.status["drives"]
