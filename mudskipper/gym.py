@@ -63,7 +63,14 @@ Array = NDArray[np.float32]
 
 
 class MudWalk(gymnasium.Env[Array, Array]):
-    """Owns a robot that walks, from `reset` on."""
+    """Owns a robot that walks, from `reset` on.
+
+    >>> walk = MudWalk(backend="direct")
+    >>> felt, info = walk.reset(seed=1)
+    >>> felt, reward, fault, over, info = walk.step(np.zeros(3, np.float32))
+    >>> fault, over, info["stuck"]
+    (False, False, False)
+    """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2, "action": ACTION, "observation": OBSERVATION}  # noqa: RUF012
 

@@ -1,11 +1,13 @@
 """The public package and the examples do what their documentation says."""
 
+import doctest
 import os
 import pickle
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ import pandas as pd
 import pytest
 
 import mudskipper
+import mudskipper.gym
+import mudskipper.logs
 from control.records import Phase, Rig
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import TICK_KIND, tick_kind
@@ -36,6 +40,14 @@ def run_example(name: str, *arguments: str, **environment: str) -> str:
 @pytest.fixture(scope="module")
 def log() -> mudskipper.OpenedLog:
     return mudskipper.open_log(LOG)
+
+
+@pytest.mark.parametrize("module", [mudskipper.logs, mudskipper.gym], ids=["logs", "gym"])
+def test_the_examples_of_the_reference_run(module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "walk.mcap").symlink_to(LOG)
+    monkeypatch.chdir(tmp_path)
+    results = doctest.testmod(module)
+    assert results.attempted and not results.failed
 
 
 def test_a_log_is_arrays_by_field_name(log: mudskipper.OpenedLog) -> None:
