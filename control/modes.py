@@ -35,6 +35,7 @@ class Request(IntEnum):
 ENERGISED = frozenset({Mode.ARMING, Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.DAMPING})
 MOVING = ENERGISED - {Mode.ARMING}  # the modes that may command torque
 HELD = MOVING - {Mode.DAMPING}  # the modes with stiffness
+PREVENTED = "was prevented: "  # in the notice about a request that was accepted, which a fault of the next tick stopped
 
 
 class Health(NamedTuple):

@@ -92,7 +92,7 @@ class Loop:
         self.learning.update(now_s, self.target.phase, self.states, self.body)
         self.learning.adapt(self.controller)
         self.health = self._examine(tick, self._end_lost_lease(now_s))
-        self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
+        self._enter(self._next_mode(now_s), now_s)
         if self.forced and self.mode not in ENERGISED:
             self.forced = ""
         if self.fault and self.controller.moving:
@@ -178,6 +178,14 @@ class Loop:
         """Return whether all drives report closed loop, in heartbeats that are newer than the request to arm."""
         asked_s = self._mode_since_s
         return all(state.closed_loop and state.heartbeat_stamp_s > asked_s for state in self.states)
+
+    def _next_mode(self, now_s: float) -> Mode:
+        """Return the mode of this tick. A request was accepted before it, so a fault of this tick may prevent it."""
+        request = self._pop_request()
+        mode = next_mode(self.mode, request, self.health)
+        if request is not Request.NONE and mode is self.mode and (prevented := refusal(mode, request, self.health)):
+            self.events.report_prevented(now_s, request, prevented.text)
+        return mode
 
     def _pop_request(self) -> Request:
         """Return the request to act on in this tick; none arms or walks while the daemon ends."""
@@ -276,6 +284,8 @@ class Loop:
         refused = self._refusal(request, order, forced)
         if refused:
             return refused
+        if request in (Request.ARM, Request.WALK):
+            self.events.forget_notice()
         changed = next_mode(self.mode, request, self.health) is not next_mode(self.mode, Request.NONE, self.health)
         changes = changed or request not in (Request.STOP, Request.DISARM)  # every user may send those at any time
         self.events.report_request(now_s, request, forced, by, changes)

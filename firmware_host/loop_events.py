@@ -9,7 +9,7 @@ from math import inf
 
 from control.fault_causes import AgedFault, group_by_cause, is_settling
 from control.faults import Fault
-from control.modes import ENERGISED, Mode, Request
+from control.modes import ENERGISED, PREVENTED, Mode, Request
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, stride_row
 from firmware_host.mud_learning import LearningReport
@@ -116,6 +116,10 @@ class LoopEvents:
         message = self.requests.update(text, changes, now_s)
         if message:
             self.report(now_s, message)
+
+    def report_prevented(self, now_s: float, request: Request, reason: str) -> None:
+        """Log and keep why a request that was accepted changed nothing."""
+        self._notify(now_s, f"{request.name.lower()} {PREVENTED}{reason}")
 
     def report_move(self, now_s: float, path: str, by: str) -> None:
         """Log a move; of a program that sends many, one a second."""

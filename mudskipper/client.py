@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from control.modes import ENERGISED, Mode
+from control.modes import ENERGISED, PREVENTED, Mode
 from mudskipper.ground_and_gait import Gait
 from operator_client.default_paths import default_socket
 from operator_client.status_client import StatusClient
@@ -137,7 +137,8 @@ class Client:
     def wait_for(self, mode: str, timeout_s: float = 30.0) -> Report:
         """Return the status once the robot is in a mode such as "hold"; renew the lease meanwhile.
 
-        Raises TimeoutError, and at once a RuntimeError with the cause where a fault or a disarm took the torque away.
+        Raises TimeoutError, and at once a RuntimeError with the cause where a fault or a disarm took the torque away,
+        or where a fault that came just after `arm` or `walk` prevents it.
         """
         deadline_s, had_torque, self._has_torque = time.monotonic() + timeout_s, self._has_torque, False
         while (report := self.status())["mode"] != mode:
@@ -153,9 +154,11 @@ class Client:
 
 
 def _why_without_torque(report: Report, had_torque: bool) -> str:
-    """Return what took the torque away, or an empty text: a robot that has yet to arm had none."""
+    """Return what took the torque away or prevents it, or an empty text: a robot that has yet to arm had none."""
     if report["mode"] == "fault" and report["fault"]:
         return "{name}: {message}".format(**report["fault"])
+    if report["notice"].startswith((f"arm {PREVENTED}", f"walk {PREVENTED}")):
+        return str(report["notice"])
     was_lost = had_torque and report["mode"] in RESTING
     return (report["notice"] or f"the torque was switched off: the robot is {report['mode']}") if was_lost else ""
 

@@ -17,6 +17,7 @@ from command_line.robot_text import MILD, Report
 from command_line.screen import MARKS, coloured, complain
 from command_line.shared_options import Json, Socket
 from control.computing.suggestion import suggestion
+from control.modes import PREVENTED
 from control.records import JOINTS
 from drivers.can.run_folder import find_run_folder
 from experiments.study.option import Option
@@ -183,11 +184,18 @@ def _stopping_causes(report: Report) -> list[Report]:
 
 def _change_mode(command: str, mode: str, socket: Socket, params: dict[str, Any], waiting_s: float = 0.0) -> Answer:
     """Send the command, again for so long as it is refused, and wait for the mode that it asks for."""
+    deadline_s, prevented = time.monotonic() + waiting_s, f"{command} {PREVENTED}"
     with StatusClient(socket) as client:
         _call_patiently(client, command, params, waiting_s)
-        report = _poll(client, lambda status: status["mode"] in (mode, "fault"), ARMING_S)
+        report = _poll(
+            client, lambda status: status["mode"] in (mode, "fault") or status["notice"].startswith(prevented), ARMING_S
+        )
     if report["mode"] == "fault":
         raise _refusal(report["fault"]["message"] if report["fault"] else report["notice"])
+    if report["notice"].startswith(prevented):
+        if (left_s := deadline_s - time.monotonic()) > 0.0:
+            return _change_mode(command, mode, socket, params, left_s)
+        raise _refusal(report["notice"])
     if report["mode"] != mode:
         raise CommandError(f"still {report['mode']} after {ARMING_S:g} s", status=exit_codes.TIMED_OUT)
     return mode_answer(command, mode, report["notice"])

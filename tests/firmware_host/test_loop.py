@@ -6,7 +6,8 @@ from itertools import pairwise
 import pytest
 
 from control.controller import WalkOrder
-from control.modes import Mode, Request
+from control.faults import FaultKind
+from control.modes import PREVENTED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import Phase, same_for_all
 from drivers.can.frames import Frame
@@ -65,6 +66,24 @@ def test_arming_holds_the_pose_it_finds_without_a_jerk(configuration: Configurat
     assert robot.loop.mode is Mode.HOLD
     assert robot.robot.plant.angles_rad == pytest.approx(before, abs=0.02)
     assert largest_nm < 0.1
+
+
+def test_an_accepted_request_that_a_fault_of_the_next_tick_prevents_is_said(
+    configuration: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = RecordedRobot(configuration)
+    assert robot.run_until(lambda: not robot.loop.faults.blocking() and robot.loop.mode is Mode.IDLE, 3.0)
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    with monkeypatch.context() as patch:
+        patch.setattr(robot.loop.fault_monitor, "update", lambda *_: [FaultKind.JOINT_MOVING.fault("left_sweep")])
+        robot.step()
+    notice = robot.loop.events.notice
+    assert notice.startswith(f"arm {PREVENTED}") and "left_sweep" in notice
+    assert robot.run_until(lambda: not robot.loop.faults.blocking(), 3.0)
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    assert robot.loop.events.notice == ""
+    robot.step()
+    assert robot.loop.mode is Mode.ARMING
 
 
 @pytest.mark.parametrize("walked_s", WALKED_S[2:])

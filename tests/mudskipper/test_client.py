@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mudskipper
+from control.modes import PREVENTED
 from mudskipper import simulated_robot
 from tests.folders import ROOT
 from tests.mudskipper.test_examples import run_example
@@ -66,6 +67,15 @@ def test_a_wait_for_the_hold_ends_at_once_where_another_program_disarms(
     reports = iter([{"mode": mode, "fault": None, "notice": ""} for mode in ("idle", "arming", "idle")])
     monkeypatch.setattr(mudskipper.Client, "status", lambda _: next(reports))
     with mudskipper.Client(bench.socket) as robot, pytest.raises(RuntimeError, match="switched off"):
+        robot.wait_for("hold")
+
+
+def test_a_wait_for_the_hold_ends_at_once_where_a_fault_prevents_arming(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    idle = {"mode": "idle", "fault": None, "notice": f"arm {PREVENTED}left_sweep moves"}
+    monkeypatch.setattr(mudskipper.Client, "status", lambda _: idle)
+    with mudskipper.Client(bench.socket) as robot, pytest.raises(RuntimeError, match="left_sweep moves"):
         robot.wait_for("hold")
 
 

@@ -19,6 +19,7 @@ from mudskipper.client import Client
 from mudskipper.ground_and_gait import Ground
 from mudskipper.gym import ACTION, MudWalk, _observation
 from mudskipper.stride_walks import DaemonWalk, SimulatedWalk, Stride
+from tests.command_line.command_lines import output
 from tests.folders import ROOT
 from tests.running_bench import Bench
 
@@ -162,7 +163,7 @@ def test_an_operator_arms_the_robot_of_a_socket_before_each_reset_and_close_stop
             assert over and not fault and info["advance_m"] > 0.01
             with pytest.raises(RuntimeError, match="idle"):
                 walk.reset()
-            operator.arm()
+            output("arm", "--wait", "--socket", str(own_bench.socket))  # the flippers may still fall
             assert operator.wait_for("hold")["lease"] is None
             walk.reset()
             walk.close()  # in the middle of an episode

@@ -9,10 +9,11 @@ import pytest
 from command_line import exit_codes
 from command_line.operation import confirmation, operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN, send_order, unconfirmed_drives
+from control.modes import PREVENTED
 from control.records import JOINTS
 from operator_client.status_client import CallRefusedError, DroppedError, NotPermittedError
 from simulation.harness.local_setup import named_folder
-from tests.command_line.command_lines import failure, json_of, run
+from tests.command_line.command_lines import failure, json_of, output, run
 from tests.command_line.fake_client import answer_with, next_of
 
 REFUSAL = "status is for members of the group mudskipper. Have root run 'adduser YOU mudskipper', then log in again"
@@ -68,6 +69,18 @@ def test_an_adaptive_walk_leaves_out_the_depths_of_its_gait(adaptive: bool, monk
     monkeypatch.setattr(operation, "_change_mode", lambda *order: ordered.append(loads(order[-1]["gait"])))
     operation.walk(socket=Path(), gait="three_depths", adaptive=adaptive)
     assert ("depths_m" in ordered[0]) is not adaptive
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_an_arm_that_a_fault_of_the_next_tick_prevents_is_refused_or_repeated(
+    waits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prevented = report("idle", False) | {"notice": f"arm {PREVENTED}left_sweep moves"}
+    answer_with(monkeypatch, next_of(prevented, report("hold", True)))
+    if waits:
+        assert output("arm", "--wait").startswith("hold")
+    else:
+        assert "left_sweep moves" in failure("arm", status=exit_codes.REFUSED)
 
 
 @each_ending
