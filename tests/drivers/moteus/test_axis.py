@@ -1,13 +1,16 @@
 """One moteus as a joint: the meaning of its answers, the questions to it, and the faults that are noticed."""
 
-from math import isfinite, nan
+from math import isfinite, nan, pi
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from drivers.drive import FD, DriveHealth
 from drivers.moteus import codec, registers
+from drivers.moteus.axis import MoteusAxis
 from drivers.moteus.codec import Mode
+from drivers.moteus.parameters import MoteusParameters
 from drivers.moteus.registers import Register, Resolution
 from drivers.odrive.drive_type import Odrive
 from simulation.devices.drive import DriveError
@@ -45,6 +48,17 @@ class Bench(DrivenDrives):
     @property
     def health(self) -> DriveHealth:
         return self.drives.health[0]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_answer_is_the_motion_of_the_joint(sign: int) -> None:
+    axis = MoteusAxis("left_sweep", MoteusParameters("a", 1, "moteus", sign=sign, zero_turn=0.25), Mock())
+    axis.begin_read(1.0)
+    answer = codec.AT_REST._replace(position_turn=0.5, velocity_turn_s=2.0, q_current_a=3.0)
+    axis.receivers[codec.reply_id(1) | FD](codec.encode_reply(answer), 1.0)
+    state = axis.state
+    assert (state.angle_rad, state.velocity_rad_s) == pytest.approx((sign * 0.5 * pi, sign * 4.0 * pi), rel=1e-4)
+    assert state.current_a == pytest.approx(sign * 3.0, rel=1e-3)
 
 
 def test_the_first_answer_has_the_time_at_which_it_is_read() -> None:
