@@ -52,9 +52,10 @@ def status_text(report: Report) -> str:
 def _ground_lines(report: Report) -> list[tuple[str, Part]]:
     """Return which law the ground follows, once strides show it."""
     law = report["mud"]["law"]
-    wrong = law and " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law["errors"].items())
-    text = law and f"{law['name']}: each coefficient is predicted wrong from the others, as {wrong}"
-    return [("ground", (text, ""))] if text else []
+    if not law:
+        return []
+    wrong = " and ".join(f"{name} by {100.0 * error:.0f} %" for name, error in law["errors"].items())
+    return [("ground", (f"{law['name']}: each coefficient is predicted wrong from the others, as {wrong}", ""))]
 
 
 def _cause_lines(cause: Report) -> str:
