@@ -50,8 +50,7 @@ def check(
     configuration = _configuration(config)
     path = read_gait(gait_document(gait))
     depth_m = max(path.depths_m, default=configuration.adaptation.initial_depth_m)
-    depths = [f"{path.name}: {wrong}" for each_m in path.depths_m if (wrong := depth_problem(configuration, each_m))]
-    if problems := [*depths, *gait_problems(path, configuration, path.depths_m)]:
+    if problems := [*_depth_problems(path, configuration), *gait_problems(path, configuration, path.depths_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
     needs_depth = f" at {100.0 * depth_m:g} cm: without depths_m it needs --depth to walk" * (not path.depths_m)
@@ -67,6 +66,11 @@ def check(
 
 def _configuration(config: Path | None) -> Configuration:
     return load_configuration(config) if config else simulated_configuration()
+
+
+def _depth_problems(path: GaitPath, configuration: Configuration) -> list[str]:
+    problems = (depth_problem(configuration, depth_m) for depth_m in path.depths_m)
+    return [f"{path.name}: depths_m: {problem}" for problem in problems if problem]
 
 
 def _phases(path: GaitPath, configuration: Configuration, depth_m: float) -> list[Sequence[str]]:
@@ -93,10 +97,13 @@ def simulate(
     fixed_base = configuration.estimation.fixed_base
     lockstep = Lockstep(configuration, track, seed, disturbances=TRACKWAY, fixed_base=fixed_base)
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
+    document = gait_document(gait)
+    if not depth and (problems := _depth_problems(read_gait(document), configuration)):
+        raise ConfigurationError(problems)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
         depths = {"depths_m": [each / 100.0 for each in depth]} if depth else {}
-        calls.methods["walk"]({"gait": as_json(gait_document(gait)), "strides": strides, **depths}, CALLER)
+        calls.methods["walk"]({"gait": as_json(document), "strides": strides, **depths}, CALLER)
     except RefusedError as problem:
         raise ConfigurationError([str(problem)]) from None
     except RuntimeError as problem:
