@@ -13,7 +13,7 @@ from control.gait.stride_table import crutching_parameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import LONGEST_JSON, GaitPath
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text
+from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text, shown
 
 SHIPPED = Path(__file__).parent / "gaits"
 
@@ -28,6 +28,8 @@ def gait_document(gait: str) -> dict[str, Any]:
         message = f"there is no such file or shipped gait; {suggestion(gait, sorted(shipped))}"
         raise FileNotFoundError(ENOENT, message, gait)
     document = {"name": path.name} | parse_document(read_text(path), path)
+    if not isinstance(document["name"], str):
+        raise ConfigurationError([f"{path.name}: name = {shown(document['name'])}: must be a text, in quotes"])
     if (length := len(as_json(document))) > LONGEST_JSON:
         most = f"must be at most {LONGEST_JSON}: leave out way-points or digits"
         raise ConfigurationError([f"{path.name}: {length} characters as JSON, {most}"])
@@ -39,7 +41,8 @@ def read_gait(document: dict[str, Any]) -> GaitPath:
     try:
         return GaitPath(**_READER.read(document))
     except ConfigurationError as problem:
-        raise problem.of(document.get("name") or "gait") from None
+        name = document.get("name")
+        raise problem.of(name if name and isinstance(name, str) else "gait") from None
 
 
 def as_json(document: dict[str, Any]) -> str:

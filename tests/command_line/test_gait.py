@@ -51,6 +51,7 @@ def test_the_whole_path_of_a_gait_is_drawn_on_scales_and_a_pause_is_a_dot() -> N
         ("", "mine.toml: phase is missing"),
         ("[[phase", "mine.toml: not a TOML file"),
         ("phase = 1", "mine.toml: phase = 1: must be tables"),
+        ("name = 3", "mine.toml: name = 3: must be a text"),
         (f"depths_m = [0.02, 0.06]\n{STANCE}{SWING}", "mine.toml: depths_m: depth 6 cm: must be from 0.5 to 5 cm"),
         (100 * STANCE + SWING, "must be at most 3000"),
     ],
