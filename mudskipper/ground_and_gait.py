@@ -90,5 +90,6 @@ class Gait(_Tables):
         except FileNotFoundError as problem:
             raise ConfigurationError([f"{problem.filename}: {problem.strerror}"]) from None
         super().__init__(document | tables)
-        if problems := list(key_problems(read_gait(self.tables))):
-            raise ConfigurationError(problems)
+        path = read_gait(self.tables)
+        if problems := list(key_problems(path)):
+            raise ConfigurationError(problems).of(path.name or "gait")

@@ -56,7 +56,7 @@ def test_nothing_changes_them() -> None:
         (Ground, {"segment": [{"start_m": 1.0, "end_m": 2.0, "sand": "generic"}]}, "start_m"),
         (Ground, {"robot": {"body_mass": 1.0}}, "body_mass_kg"),
         (Gait, {"depths_m": [0.02]}, "phase"),
-        (Gait, {"phase": [{"name": "swing", "duration_s": 0.5}] * 2}, "swing"),
+        (Gait, {"phase": [{"name": "swing", "duration_s": 0.5}] * 2, "name": "mine"}, "mine: phase = swing"),
         (Gait, {"phase": [{"name": "run"}]}, "run"),
     ],
 )
