@@ -115,14 +115,17 @@ class MudWalk(gymnasium.Env[Array, Array]):
             self._walk = DaemonWalk(world, number, depth_m, self._socket)
         else:
             self._walk = SimulatedWalk(Direct if self._backend == "direct" else Lockstep, world, number, depth_m)
-        self._walked_s = 0.0
+        self._walked_s, self._ended = 0.0, False
         stride = self._walk.walk_stride()
         return _observation(stride), _parts(stride)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Walk the next stride as ordered, up to the swing in which its estimates are known."""
+        """Walk the next stride as ordered, up to the swing in which its estimates are known.
+
+        Raises ResetNeeded before `reset` and after the end of an episode.
+        """
         walk = self._walk
-        if walk is None:
+        if walk is None or self._ended:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         if not self.action_space.contains(np.asarray(action, np.float32)):
             raise ValueError(f"action {action}: must be {len(ACTION)} numbers from -1 to 1, for {', '.join(ACTION)}")
@@ -137,6 +140,7 @@ class MudWalk(gymnasium.Env[Array, Array]):
         self._walked_s += stride.duration_s
         parts, over = _parts(stride), self._walked_s >= self._episode_s
         if over or stride.fault:
+            self._ended = True
             walk.end()
         reward = CM_PER_M * parts["advance_m"] - PER_JOULE * parts["energy_j"]
         reward -= STUCK * parts["stuck"] + FAULT * bool(parts["fault"])

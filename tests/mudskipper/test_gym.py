@@ -37,7 +37,7 @@ def test_gymnasium_s_own_checker_finds_nothing(backend: str) -> None:
 
 
 def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> None:
-    with gymnasium.make(ENV, duration_s=4.0, world=mud(2000.0)).unwrapped as walk:
+    with gymnasium.make(ENV, world=mud(2000.0)).unwrapped as walk:
         assert isinstance(walk, MudWalk)
         _, info = walk.reset(seed=1)
         begun_m, advanced_m = info["body_m"], 0.0
@@ -49,12 +49,14 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
             lockstep = walk._walk._lockstep
             sweep_deg = lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
             assert sweep_deg == pytest.approx(ACTION["sweep_angle_deg"][int(action[1] > 0.0)])
-        assert over and not fault
+        assert not (over or fault)
         assert felt[9] == pytest.approx(2.75, abs=0.5)  # cm of depth: the middle of its range
         assert advanced_m == pytest.approx(info["body_m"] - begun_m) and advanced_m > 0.08
         lockstep.late_ticks = 1000
         _, _, fault, _, info = walk.step(np.zeros(3, np.float32))
         assert fault and info["fault"].startswith("The loop")  # its message, as of a daemon
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            walk.step(np.zeros(3, np.float32))
 
 
 def test_a_daemon_s_robot_whose_pose_is_missing_for_a_stride_has_its_advance_in_the_next(
@@ -117,6 +119,8 @@ def test_a_daemon_and_no_buses_feel_and_pay_as_lockstep_does() -> None:
             walk.reset(seed=1)
             felt, reward, fault, over, info = walk.step(np.array([0.2, 0.0, 0.0], np.float32))
             assert over and not fault
+            with pytest.raises(gymnasium.error.ResetNeeded):
+                walk.step(np.zeros(3, np.float32))
             walks.append((*felt[6:11].tolist(), info["advance_m"], info["energy_j"], reward))
     lockstep, direct, daemon = walks
     assert direct == pytest.approx(lockstep, rel=0.1)  # it arms at another tick, so the noise is another
