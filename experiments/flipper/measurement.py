@@ -110,7 +110,8 @@ def pose_remarks(before_m: float | None, after_m: float | None, bound_m: float =
     """Describe a motion of the base beyond the bound; return nothing where it is smaller or unknown."""
     if before_m is None or after_m is None or abs(after_m - before_m) <= bound_m:
         return []
-    return [f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"]
+    moved = f"{1000.0 * (after_m - before_m):.1f} mm, more than {1000.0 * bound_m:g} mm"
+    return [f"the base moved by {moved}: clamp it, and measure again"]
 
 
 def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[str]:
@@ -128,9 +129,10 @@ def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[s
         change_a = float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
         change_nm = abs(configuration.torque_constants_nm_a[joint] * change_a)
         if isfinite(change_nm) and change_nm > bound_nm:
+            change = f"{change_nm:.2f} N·m, more than {bound_nm:g} N·m,"
             remarks.append(
-                f"the load of {log.rig.joints[joint]} in free air changed by {change_nm:.2f} N·m during the"
-                " stride: clean the flipper, check that the base is firm, and measure again"
+                f"the load of {log.rig.joints[joint]} in free air changed by {change}"
+                " during the stride: clean the flipper, check that the base is firm, and measure again"
             )
     return remarks
 
@@ -140,7 +142,8 @@ def surface_remarks(stride: dict[str, Any]) -> list[str]:
     if surface_m is None or abs(surface_m) <= SURFACE_M:
         return []
     where = "below" if surface_m > 0.0 else "above"
+    bound = f"more than {1000.0 * SURFACE_M:g} mm"
     return [
-        f"the mud was met {1000.0 * abs(surface_m):.0f} mm {where} its nominal height: fill it up to "
-        "geometry.axis_height_m below the axes, or measure that height again"
+        f"the mud was met {1000.0 * abs(surface_m):.0f} mm {where} its nominal height, {bound}: "
+        "fill it up to geometry.axis_height_m below the axes, or measure that height again"
     ]

@@ -43,7 +43,7 @@ POLL_S = 0.05  # interval at which the status is checked
 Muds = tuple[tuple[str, float], ...]  # names, which differ, and lengths in m
 PAST_END = ""  # name of the mud past the end of the trackway
 UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"
-BACKWARDS = "the measured position falls while the robot walks: reverse pose.axis, or the sign of metres_per_count"
+REVERSE = "reverse pose.axis, or the sign of metres_per_count"
 
 
 def muds_of(typed: Sequence[tuple[str, float]]) -> Muds:
@@ -166,7 +166,8 @@ class Progress:
         if mud == PAST_END and status["phase"] == "insertion":
             return End()
         if plates_m < -BACKWARDS_M:
-            return End(BACKWARDS, stopped=True)
+            fell = f"{-100.0 * plates_m:.0f} cm, more than {100.0 * BACKWARDS_M:g} cm, while the robot walked"
+            return End(f"the measured position fell by {fell}: {REVERSE}", stopped=True)
         stuck = mud != PAST_END and now_s - self._entered_s > STUCK_S or now_s - self._begun_s > PATIENCE_S
         return End(f"stuck in {mud or 'the end'}") if stuck else None
 

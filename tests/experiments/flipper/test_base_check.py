@@ -4,7 +4,14 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.flipper.measurement import INVALID_M, load_remarks, pose_remarks, surface_remarks
+from experiments.flipper.measurement import (
+    ADDUCTION_NM,
+    INVALID_M,
+    SWEEP_NM,
+    load_remarks,
+    pose_remarks,
+    surface_remarks,
+)
 from logs.files.log_reader import Log
 from tests.experiments.synthetic_strides import (
     CONFIGURATION,
@@ -35,7 +42,8 @@ def test_a_changed_load_in_free_air_is_reported(joint: int, still_nm: float, mov
         assert not load_remarks(trial(joint, 0.1, 0.1 + sign * still_nm), CONFIGURATION, "right")
         (remark,) = load_remarks(trial(joint, 0.1, 0.1 + sign * moved_nm), CONFIGURATION, "right")
         assert ("right_sweep" if joint == RIGHT_SWEEP else "right_adduction") in remark
-        assert f"{moved_nm:.2f} N·m" in remark
+        bound_nm = SWEEP_NM if joint == RIGHT_SWEEP else ADDUCTION_NM
+        assert f"{moved_nm:.2f} N·m, more than {bound_nm:g} N·m" in remark
 
 
 def test_the_other_flipper_and_a_log_without_an_insertion_give_no_remark() -> None:
@@ -44,14 +52,15 @@ def test_the_other_flipper_and_a_log_without_an_insertion_give_no_remark() -> No
 
 
 def test_a_pose_that_moved_is_reported_in_millimetres() -> None:
-    assert "-4.7 mm" in pose_remarks(0.1, 0.0953)[0]
+    assert "-4.7 mm, more than 2 mm" in pose_remarks(0.1, 0.0953)[0]
     assert not pose_remarks(0.1, 0.0953, INVALID_M) and pose_remarks(0.1, 0.0853, INVALID_M)
     for before_m, after_m in ((0.1, 0.1015), (None, 0.1), (0.1, None), (None, None)):
         assert not pose_remarks(before_m, after_m)
 
 
 def test_mud_met_far_from_its_nominal_height_is_reported() -> None:
-    for surface_m, where in ((0.012, "12 mm below"), (-0.012, "12 mm above")):
-        assert where in surface_remarks(make_stride(surface_m=surface_m))[0]
+    for surface_m, where in ((0.012, "below"), (-0.012, "above")):
+        (remark,) = surface_remarks(make_stride(surface_m=surface_m))
+        assert f"12 mm {where} its nominal height, more than 10 mm" in remark
     for still_m in (0.005, None):
         assert not surface_remarks(make_stride(surface_m=still_m))

@@ -152,7 +152,7 @@ def test_a_walk_without_a_pose_or_that_another_client_stops_is_invalid(
     [
         (91.0, 0.1, "stuck in 48.5", False),
         (60.0, 0.6, "", False),
-        (60.0, -0.3, "the measured position falls", True),
+        (60.0, -0.3, "the measured position fell by 30 cm, more than 20 cm", True),
         (60.0, None, "the pose of the body is lost", True),
     ],
 )
