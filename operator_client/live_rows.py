@@ -11,7 +11,7 @@ from firmware_host.log.row_records import split_records
 from firmware_host.log.row_stream import BUFFER_BYTES, FULL, LOST, OPENING, REFUSAL
 from firmware_host.log.rows import TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
-from operator_client.status_client import NoDaemonError, NotPermittedError
+from operator_client.status_client import SILENT, DroppedError, NoDaemonError, NotPermittedError
 
 OPENING_S = 5.0  # the longest wait for the first packet
 
@@ -40,11 +40,11 @@ class LiveRows:
         self.configuration_text = ""
         self._path = path
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.setblocking(False)  # with too many subscribers, connecting would wait for one to leave
+        self._socket.setblocking(False)  # connecting to a full queue would wait
         try:
             self._connect()
             if opening_s > 0.0 and not (self.read(opening_s) or self.is_open):
-                raise self.too_many
+                raise self.silent
         except (NoDaemonError, NotPermittedError):
             self.close()
             raise
@@ -55,14 +55,15 @@ class LiveRows:
         except PermissionError as problem:
             raise NotPermittedError(f"no permission to use {self._path}") from problem
         except BlockingIOError:
-            raise self.too_many from None
+            raise self.silent from None
         except OSError as problem:
             missing = f"no daemon serves rows on {self._path}: it is not running, or its log is off"
             raise NoDaemonError(missing) from problem
 
     @property
-    def too_many(self) -> NoDaemonError:
-        return NoDaemonError(f"{self._path} accepts no more subscribers; end another viewer")
+    def silent(self) -> DroppedError:
+        """Return the error of a daemon that is too slow to accept; one without a free place says so itself."""
+        return DroppedError(f"the daemon does not answer on {self._path}: it is busy or hangs; {SILENT}")
 
     @property
     def is_open(self) -> bool:

@@ -47,7 +47,7 @@ class RowSubscription:
             self.problem, self.source = "", rows
             self.daemons += 1
         elif not rows.is_open and now_s > self._tried_s + OPENING_S:
-            raise rows.too_many
+            raise rows.silent
         return received
 
     def close(self) -> None:
