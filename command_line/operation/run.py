@@ -22,6 +22,7 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import Annotated, Any
 
+from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.json_output import Answer
 from command_line.operation.attended_walk import LEASE_S, LawError, attend, attend_pose
@@ -60,17 +61,22 @@ def run(
         with StatusClient(socket) as client:
             if rate_hz:
                 return _move_joints(client, chosen, rate_hz, take_over)
-            read = client.call("status")["strides_closed"]
+            read, reached = client.call("status")["strides_closed"], -1
 
             def order(client: StatusClient, status: Report) -> None:
-                nonlocal read
+                nonlocal read, reached
+                reached = max(reached, status["stride"])
                 closed = client.call("strides", since=read)
                 read += len(closed)
                 if closed and (answer := order_of(chosen, closed)) is not None:
                     _give(client, "stride", answer, "walking")
 
             depth_m = (depth or FIRST_DEPTH_CM) / 100.0
-            return attend(client, json, {"depth_m": depth_m, "strides": strides, "take_over": take_over}, order)
+            answer = attend(client, json, {"depth_m": depth_m, "strides": strides, "take_over": take_over}, order)
+        if answer.status == exit_codes.OK and not 0 < strides <= reached + 1:
+            complain("another program stopped the robot")
+            return answer._replace(report=None, status=exit_codes.REFUSED)
+        return answer
 
 
 def _move_joints(client: StatusClient, law: Law, rate_hz: float, take_over: bool) -> Answer:

@@ -39,7 +39,7 @@ class WalkOfTwoStrides(StatusClient):
         if method == "status":
             self._asked += 1
             rests = self.stopped or self._asked > 8
-            return MODE | {"mode": "hold" if rests else "walking", "strides_closed": 10}
+            return MODE | {"mode": "hold" if rests else "walking", "strides_closed": 10, "stride": self._asked // 2}
         if method == "strides":
             closed = 10 + 2 * min(2, self._asked // 2)
             return [{"flipper": "left", "number": number} for number in range(params["since"], closed)]
@@ -114,13 +114,13 @@ def law(folder: Path, body: str, rate_hz: str = "") -> str:
 def test_a_law_is_called_once_for_each_stride_that_closed(
     daemon: WalkOfTwoStrides, tmp_path: Path, body: str, orders: Sequence[dict[str, Any]]
 ) -> None:
-    assert json_of("run", law(tmp_path, body)) == HELD
+    assert json_of("run", law(tmp_path, body), "--strides", "2") == HELD
     assert daemon.orders == list(orders)
 
 
 @pytest.mark.usefixtures("daemon")
 def test_with_json_a_law_prints_to_standard_error(tmp_path: Path) -> None:
-    ended = run_command("run", law(tmp_path, "print('thinking')"), "--json")
+    ended = run_command("run", law(tmp_path, "print('thinking')"), "--json", "--strides", "2")
     assert json.loads(ended.stdout) == HELD and "thinking" in ended.stderr
 
 
@@ -160,6 +160,18 @@ def test_an_order_that_the_daemon_refuses_stops_the_robot(daemon: WalkOfTwoStrid
     daemon.refusal = "depth_m = 9: too deep"
     ended = run_command("run", law(tmp_path, "return 9.0"))
     assert ended.returncode == exit_codes.REFUSED and daemon.refusal in ended.stderr and daemon.stopped
+
+
+@pytest.mark.usefixtures("daemon")
+@pytest.mark.parametrize(
+    ("strides", "status"), [((), exit_codes.REFUSED), (("--strides", "9"), exit_codes.REFUSED), (("--strides", "5"), 0)]
+)
+def test_a_law_that_another_program_stops_is_refused_as_one_of_joints_is(
+    tmp_path: Path, strides: Sequence[str], status: int
+) -> None:
+    """The robot begins five strides."""
+    ended = run_command("run", law(tmp_path, "return None"), *strides)
+    assert (ended.returncode, ended.stdout.splitlines()[-1]) == (status, "hold")
 
 
 def test_a_program_that_takes_the_robot_over_is_not_stopped(daemon: WalkOfTwoStrides, tmp_path: Path) -> None:
