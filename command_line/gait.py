@@ -50,7 +50,9 @@ def check(
     configuration = _configuration(config)
     path = read_gait(gait_document(gait))
     depth_m = max(path.depths_m, default=configuration.adaptation.initial_depth_m)
-    if problems := [*_depth_problems(path, configuration), *gait_problems(path, configuration, path.depths_m)]:
+    depth_problems = (depth_problem(configuration, each_m) for each_m in path.depths_m)
+    problems = [f"{path.name}: depths_m: {problem}" for problem in depth_problems if problem]
+    if problems := [*problems, *gait_problems(path, configuration, path.depths_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
     needs_depth = f" at {100.0 * depth_m:g} cm: without depths_m it needs --depth to walk" * (not path.depths_m)
@@ -66,11 +68,6 @@ def check(
 
 def _configuration(config: Path | None) -> Configuration:
     return load_configuration(config) if config else simulated_configuration()
-
-
-def _depth_problems(path: GaitPath, configuration: Configuration) -> list[str]:
-    problems = (depth_problem(configuration, depth_m) for depth_m in path.depths_m)
-    return [f"{path.name}: depths_m: {problem}" for problem in problems if problem]
 
 
 def _phases(path: GaitPath, configuration: Configuration, depth_m: float) -> list[Sequence[str]]:
@@ -98,8 +95,6 @@ def simulate(
     lockstep = Lockstep(configuration, track, seed, disturbances=TRACKWAY, fixed_base=fixed_base)
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     document = gait_document(gait)
-    if not depth and (problems := _depth_problems(read_gait(document), configuration)):
-        raise ConfigurationError(problems)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
         depths = {"depths_m": [each / 100.0 for each in depth]} if depth else {}

@@ -2,8 +2,8 @@
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from math import isfinite, radians
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -102,22 +102,10 @@ def walk(
         params["gait"] = as_json(document)
     if depth:
         params |= {"depths_m": [each / 100.0 for each in depth]} if len(depth) > 1 else {"depth_m": depth[0] / 100.0}
-    with _naming_depths_of("" if depth else gait):
-        if attended:
-            with StatusClient(socket) as client:
-                return attend(client, json, params)
-        return _change_mode("walk", "walking", socket, params)
-
-
-@contextmanager
-def _naming_depths_of(gait: str) -> Iterator[None]:
-    """Name the gait whose depth the daemon refuses, since the daemon names only the depth."""
-    try:
-        yield
-    except CallRefusedError as problem:
-        if gait and str(problem).startswith("depth "):
-            raise CallRefusedError(f"{gait}: depths_m: {problem}") from None
-        raise
+    if attended:
+        with StatusClient(socket) as client:
+            return attend(client, json, params)
+    return _change_mode("walk", "walking", socket, params)
 
 
 def joint_angle(text: str) -> tuple[str, float]:

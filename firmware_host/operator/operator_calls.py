@@ -191,9 +191,10 @@ class OperatorCalls:
             raise RefusedError("give either depth_m or depths_m")
         depths_m = in_turn_m or (() if depth_m is None else (depth_m,))
         path = self._gait(params["gait"]) if params["gait"] and self._loop.mode is Mode.HOLD else None  # else refused
+        source = f"{path.name}: depths_m: " if path and not depths_m else ""
         depths_m = depths_m or (path.depths_m if path else ())
         for each_m in depths_m:
-            self._require_depth(each_m)
+            self._require_depth(each_m, source)
         gait = self._checked(path, depths_m) if path else None
         order = WalkOrder(
             depth_m=float(depths_m[0]) if depths_m else self._loop.configuration.adaptation.initial_depth_m,
@@ -228,10 +229,10 @@ class OperatorCalls:
             raise RefusedError(problem)
         return parameters or path
 
-    def _require_depth(self, depth_m: float) -> None:
-        """Raise RefusedError for a depth beyond the configured ones."""
+    def _require_depth(self, depth_m: float, source: str = "") -> None:
+        """Raise RefusedError, with the source before it, for a depth beyond the configured ones."""
         if problem := depth_problem(self._loop.configuration, depth_m):
-            raise RefusedError(problem)
+            raise RefusedError(f"{source}{problem}")
 
     def change_strides(self, params: dict[str, Any], caller: Caller) -> str:
         """Set the depth of the present walk, and its gait where that is given."""

@@ -11,8 +11,6 @@ from command_line.operation import confirmation, operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN, send_order, unconfirmed_drives
 from control.modes import PREVENTED
 from control.records import JOINTS
-from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.gait_checks import depth_problem
 from operator_client.status_client import CallRefusedError, DroppedError, NotPermittedError
 from simulation.harness.local_setup import named_folder
 from tests.command_line.command_lines import failure, json_of, output, run
@@ -71,15 +69,6 @@ def test_an_adaptive_walk_leaves_out_the_depths_of_its_gait(adaptive: bool, monk
     monkeypatch.setattr(operation, "_change_mode", lambda *order: ordered.append(loads(order[-1]["gait"])))
     operation.walk(socket=Path(), gait="three_depths", adaptive=adaptive)
     assert ("depths_m" in ordered[0]) is not adaptive
-
-
-@pytest.mark.parametrize(("options", "named"), [((), "ellipse: depths_m: "), (("--depth", "6"), "")])
-def test_a_refused_depth_names_the_gait_that_it_is_of(
-    configuration: Configuration, options: tuple[str, ...], named: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    problem = depth_problem(configuration, 0.06)
-    answer_with(monkeypatch, lambda method: CallRefusedError(problem))
-    assert failure("walk", "--gait", "ellipse", *options, status=exit_codes.REFUSED) == f"mudskipper: {named}{problem}"
 
 
 @pytest.mark.parametrize("waits", [False, True])

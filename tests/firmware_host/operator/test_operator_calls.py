@@ -12,6 +12,7 @@ from control.modes import Mode
 from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.gait_file import as_json, gait_document
 from firmware_host.log.recorder import LONGEST_TEXT
 from firmware_host.loop import Loop
 from firmware_host.mud_learning import ClosedStride
@@ -411,6 +412,11 @@ def test_a_walk_takes_several_depths_in_turn_until_one_is_fixed(armed: Robot) ->
     for depths_m, depth_m in (([0.02, 0.2], None), ([0.02], 0.02), ([], None), ([0.02, "deep"], None)):
         with pytest.raises(RefusedError):
             armed.ask("walk", depths_m=depths_m, depth_m=depth_m)
+    gait = as_json(gait_document("ellipse") | {"depths_m": [0.06]})
+    with pytest.raises(RefusedError, match=r"ellipse\.toml: depths_m: depth 6 cm"):
+        armed.ask("walk", gait=gait)
+    with pytest.raises(RefusedError, match="^depth 6 cm"):
+        armed.ask("walk", gait=gait, depth_m=0.06)
     armed.ask("walk", depths_m=[0.02, 0.03])
     for stride in range(3):
         armed.run_until_stride(stride)
