@@ -295,7 +295,7 @@ class FlipperEstimator(StrideEstimator):
         outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0
         return Learned(
             k_p=_widened(_named(stride.k_p, surface), outward),
-            k_s=_named(self._shear_estimate(shear, stride), surface),
+            k_s=_widened(_named(self._shear_estimate(shear, stride), surface), shear.oblique),
             k_e=_widened(_named(k_e, surface), outward),
             surface_m=surface.depth_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),

@@ -10,8 +10,11 @@ The plate's pressure is k_s ζ only where the mud yields. Because the flippers c
                       and for any batch a stance in which the mud does not yield: a lower bound of k_s
 
 A batch counts as yielding once the plate has slipped MOBILISED_M since the stance began and still slips. With a fixed
-base all travel is slip. Without a pose the size of the force decides: while both flippers together push less than the
-body's drag the body cannot have moved; otherwise the largest force withstood is a lower bound.
+base all travel is slip. On a path the plate sinks and rises too, and a batch counts only where it slips more than that.
+Clay presses as much on a face that also moves along itself. Sand resists along the motion, so across the plate by the
+cosine of its angle; what that takes away is an uncertainty of k_s. Without a pose the size of the force decides: while
+both flippers together push less than the body's drag the body cannot have moved; otherwise the largest force withstood
+is a lower bound.
 """
 
 from collections.abc import Sequence
@@ -28,11 +31,12 @@ from control.records import UNKNOWN
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
 from estimation.strokes.stroke import Batch
-from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY, FittedStroke
+from estimation.strokes.stroke_fit import SHORTEST_M, TORQUE_REPEATABILITY, FittedStroke
 from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
 
 MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
 SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
+LEAST_COSINE = 0.7  # of the angle between the plate's motion and its slip
 QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
@@ -59,6 +63,7 @@ class Shear(NamedTuple):
     moment_m4: float = inf  # mean Ψ of the batches that count, by which an error of the torque becomes one of k_s
     steady: Sequence[int] = ()  # the batches of the fit; none for a bound
     slipping: float = 1.0  # the plate's slip in them, as a fraction of the flipper's own travel
+    oblique: float = 0.0  # uncertainty of k_s because the plate also sinks or rises, as a fraction
 
 
 def find_shear(
@@ -85,10 +90,12 @@ def find_shear(
     slips = slips_m(geometry, batches, base)
     if slips is None:
         return _without_pose(geometry, batches, moments, held, drag_n)
-    steady = _yielding(geometry, batches, slips)
+    cosines = _cosines(geometry, batches, slips) if along_path else [1.0] * len(batches)
+    steady = [i for i in _yielding(geometry, batches, slips) if cosines[i] > LEAST_COSINE]
     if len(steady) >= MIN_BATCHES:
         shear = _value(_case(geometry, batches, slips), steady, batches, moments)
-        return shear._replace(slipping=_slipping(geometry, batches, slips, steady))
+        oblique = 1.0 - exact_sum(cosines[i] for i in steady) / len(steady)
+        return shear._replace(slipping=_slipping(geometry, batches, slips, steady), oblique=oblique)
     if any(batch.saturated for batch in batches):
         return _bound(geometry, MOTOR, "a motor at its limit", batches, held)
     return _bound(geometry, BODY, "the mud held: the body moved", batches, held)
@@ -104,6 +111,16 @@ def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: 
     fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
     moment_m4 = exact_sum(moments[i] for i in steady) / len(steady)
     return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4, steady=steady)
+
+
+def _cosines(geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[float]) -> list[float]:
+    """Return the cosine of the angle between the plate's motion and its slip, of each batch; the first has none."""
+    depths_m = [geometry.depth_m(batch.sweep_rad, batch.adduction_rad) for batch in batches]
+    motions = zip(slips, pairwise(depths_m), strict=True)
+    return [
+        0.0,
+        *(slip_m / max(hypot(slip_m, after_m - before_m), SHORTEST_M) for slip_m, (before_m, after_m) in motions),
+    ]
 
 
 def _slipping(

@@ -115,6 +115,39 @@ def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough(b
     assert shear.samples == 10 * len(reported)
 
 
+def in_sand(rises_m: Sequence[float]) -> list[Batch]:
+    """Return batches of a path that rises by so much to each next piece, in sand, which resists along the motion."""
+    level = poses(count=1 + len(rises_m))
+    depth_m, path = DEPTH_M, level[:1]
+    for batch, rise_m in zip(level[1:], rises_m, strict=True):
+        depth_m -= rise_m
+        path.append(batch._replace(adduction_rad=GEOMETRY.adduction_rad(batch.sweep_rad, depth_m)))
+    slips = [0.0, *(slips_m(GEOMETRY, path, Base.FIXED) or ())]
+    cosines = [slip_m / hypot(slip_m, rise_m) for slip_m, rise_m in zip(slips[1:], rises_m, strict=True)]
+    return [
+        batch._replace(sweep_nm=cosine * K_S * moment_m4(batch))
+        for batch, cosine in zip(path, [1.0, *cosines], strict=True)
+    ]
+
+
+def found_on_path(batches: Sequence[Batch]) -> Shear:
+    return finish(find_shear(GEOMETRY, batches, 0.0, Base.FIXED, DRAG_N, along_path=True))
+
+
+def test_pieces_of_a_path_that_rise_more_than_they_slip_do_not_count() -> None:
+    level, rising = [0.0] * 9, [0.0065] * 4
+    shear = found_on_path(in_sand(level + rising))
+    assert shear == found_on_path(in_sand(level)) != found(in_sand(level + rising), Base.FIXED)
+    assert (k_of(shear), shear.oblique) == (pytest.approx(K_S, rel=EXACT), pytest.approx(0.0, abs=EXACT))
+
+
+@pytest.mark.parametrize("rise_m", [-0.0008, 0.0008])
+def test_what_sand_takes_away_from_a_path_that_rises_or_sinks_is_an_uncertainty(rise_m: float) -> None:
+    shear = found_on_path(in_sand([rise_m] * (COUNT - 1)))
+    assert 0.005 < shear.oblique < 0.02
+    assert k_of(shear) == pytest.approx((1.0 - shear.oblique) * K_S, rel=0.001)
+
+
 # the body moves
 
 
