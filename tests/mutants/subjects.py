@@ -22,6 +22,7 @@ MORE_OFTEN = "the same counters are only read more often"
 ROUNDED = "a sum of such times never is exactly the bound"
 SAME = "the same value replaces itself"
 REPORTED = "the report tests the exact bound again"
+CONVERGED = "the bisection ends at the same stiffness"
 SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
     Subject(
@@ -203,7 +204,16 @@ SUBJECTS = (
             "Lt to LtE in `now_s - self._armed_s < REPEAT_S`": ROUNDED,
         },
     ),
-    Subject("control.joint_pd", ("control/test_velocity_prediction.py", "control/test_joint_pd.py")),
+    Subject(
+        "control.joint_pd",
+        ("control/test_velocity_prediction.py", "control/test_joint_pd.py"),
+        equivalent={
+            "True to False in `strict=True`": ONE_EACH,
+            "GtE to Gt in `phase_margin_rad(middle, damping_nm_s_rad, inertia_kg_m2) >= LEAST_MARGIN_RAD`": CONVERGED,
+            "60 to 61 in `range(60)`": CONVERGED,
+            "2 to 3 in `LOOP_DELAY_S ** 2`": CONVERGED,
+        },
+    ),
     Subject("control.controller", ("control/test_controller.py",)),
     Subject("firmware_host.fault_monitor", ("firmware_host/test_fault_monitor.py",), has_fixtures=True),
     Subject(
