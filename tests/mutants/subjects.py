@@ -17,6 +17,7 @@ class Subject(NamedTuple):
 A_TEXT = "a text of the diagram"
 CONTINUOUS = "it has the same value there from both sides"
 ONE_EACH = "each of them has one value for each joint"
+NO_STRIDE = "no stride has either number, nor the one before a stride"
 NO_NUMBER = "neither of them is finite either"
 MORE_OFTEN = "the same counters are only read more often"
 ROUNDED = "a sum of such times never is exactly the bound"
@@ -215,7 +216,33 @@ SUBJECTS = (
         },
     ),
     Subject("control.controller", ("control/test_controller.py",)),
-    Subject("firmware_host.fault_monitor", ("firmware_host/test_fault_monitor.py",), has_fixtures=True),
+    Subject(
+        "firmware_host.fault_monitor",
+        ("firmware_host/test_fault_monitor.py",),
+        has_fixtures=True,
+        equivalent={
+            "True to False in `strict=True`": ONE_EACH,
+            "Gt to GtE in `state.temperature_c > warm_c`": CONTINUOUS,
+            "LtE to Lt in `joint.winding.temperature_c <= warm_c`": CONTINUOUS,
+            "Gt to GtE in `tick.now_s - monitor_input.mode_since_s > ARMING_S`": ROUNDED,
+            "Lt to LtE in `CUT_S < max(silent_s) < min(silent_s) + CUT_S`": ROUNDED,
+            "Gt to GtE in `tick.missed * self._period_s > STALL_S`": ROUNDED,
+            "Lt to LtE in `tick.now_s - self._held_back_s[joint] < CATCH_UP_S`": ROUNDED,
+            "Gt to GtE in `now_s - self._pose_stamp_s > POSE_FORGOTTEN_S`": ROUNDED,
+            "without `if not (found or self._broken):` in"
+            " `def _check_trust(self, found: list[Fault], mode: Mode) -> None:`": SPEED,
+            "never in `if not (found or self._broken):`": SPEED,
+            "without `return` in `if not (found or self._broken):`": SPEED,
+            "always in `Joints(*(joint not in blind for joint in self._rig.joints))"
+            " if blind else self._all_truste`": SPEED,
+            "always in `if health is not self._sound[health.joint]:`": SPEED,
+            "without `self._sound[health.joint] = health if len(found) == before else None` in"
+            " `if health is not self._sound[health.joint]:`": SPEED,
+            "never in `health if len(found) == before else None`": SPEED,
+            "1 to 2 in `-1`": NO_STRIDE,
+            "9 to 10 in `-9`": NO_STRIDE,
+        },
+    ),
     Subject(
         "drivers.odrive.cansimple_axis",
         ("drivers/odrive/test_axis.py", "drivers/odrive/test_drives.py"),
