@@ -17,7 +17,7 @@ from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
 from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S
-from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, same_for_each
+from control.records import DriveState, DriveStates, FlipperJoints, JointAngles, Joints, Phase, same_for_each
 from tests.control.synthetic_states import NO_TORQUE, states_at
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
@@ -27,6 +27,7 @@ FRONT = Joints(radians(30.0), 0.0, radians(30.0), 0.0)
 SPRING = JointGains(1.0, 0.0, 1.0, 0.0)  # torque = wanted angle - measured angle
 DAMPER = JointGains(0.0, 1.0, 0.0, 1.0)  # torque = wanted velocity - measured velocity
 RANGES = same_for_each(JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
+APART = replace(crutching(replace(GAIT, swing_duration_s=0.4)), right_offset_fraction=0.5)
 STILL_MODES = sorted(set(Mode) - MOVING)
 
 
@@ -146,12 +147,12 @@ def test_a_walk_is_finished_after_the_strides_that_were_ordered_and_without_a_nu
 
 def test_flippers_apart_both_take_the_depths_in_turn() -> None:
     depths_m = (0.02, 0.04, 0.03)
-    path = replace(crutching(replace(GAIT, swing_duration_s=0.4)), right_offset_fraction=0.5)
-    controller = walking(WalkOrder(depths_m[0], adaptive=False, depths_m=depths_m, gait=path))
+    controller = walking(WalkOrder(depths_m[0], adaptive=False, depths_m=depths_m, gait=APART))
     deepest_m: list[list[float]] = [[], []]
     while controller.gait.stride < 4:
         controller.gait.next_depth_m = controller.order.depth_of(controller.gait.stride + 1)  # as at each close
         pose = wanted_pose(controller, Mode.WALKING)
+        assert controller.target.phase is Phase.STROKE and controller.target.sweep_rad == pytest.approx(pose[0])
         for reached_m, (sweep_rad, lift_rad) in zip(deepest_m, pose.flippers, strict=True):
             depth_m = GEOMETRY.depth_m(sweep_rad, lift_rad)
             if depth_m < 0.0:
@@ -161,6 +162,36 @@ def test_flippers_apart_both_take_the_depths_in_turn() -> None:
     left_m, right_m = ([depth_m for depth_m in reached_m if depth_m] for reached_m in deepest_m)
     assert left_m == pytest.approx([*depths_m, depths_m[0]], abs=1e-4)
     assert right_m[:3] == pytest.approx(depths_m, abs=1e-4)
+
+
+def test_of_flippers_apart_one_stands_still_while_the_other_one_is_stuck_and_goes_on_after_it() -> None:
+    controller = ordered(WalkOrder(0.03, adaptive=False, gait=APART))
+    controller.recovery = Recovery(RecoveryParameters(), GEOMETRY, GAIT, RANGES)
+    pose, lefts, held = path_to_the_gait(controller)[-1], list[FlipperJoints[float]](), None
+
+    def follow() -> JointAngles:
+        """Step with joints that follow, but the stuck ones."""
+        wanted = wanted_pose(controller, Mode.WALKING, pose)
+        lefts.append(wanted.flippers[0])
+        return wanted
+
+    while controller.target.phase is not Phase.RECOVERY:
+        wanted = follow()
+        if held is None and GEOMETRY.depth_m(*wanted[2:]) > 0.02:
+            held = wanted.flippers[1]
+        pose = Joints(*wanted[:2], *(held or wanted[2:]))
+    parameters = controller.recovery.parameters
+    for _ in range(round((parameters.pause_s + 0.2) / PERIOD_S)):
+        wanted = follow()
+        pose = Joints(*wanted[:2], *pose[2:])
+    stood = round((parameters.grace_s + parameters.pause_s + 0.2) / PERIOD_S)
+    assert all(left == pytest.approx(lefts[-1]) for left in lefts[-stood + 2 :])
+    assert lefts[-stood - 10] != pytest.approx(lefts[-1])
+    assert held and wanted[3] > held.adduction + 0.01  # pulled
+    pose = Joints(*wanted[:2], *RAISED[2:])
+    for _ in range(10):
+        follow()
+    assert controller.target.phase is Phase.STROKE and lefts[-1] != pytest.approx(lefts[-11])
 
 
 def raise_flippers(controller: Controller) -> list[JointAngles]:
