@@ -15,7 +15,7 @@ motor.cpp and foc.cpp of odriverobotics/ODrive, tag fw-v0.5.6.
 
 from collections.abc import Callable, Mapping
 
-from control.records import NEVER_S
+from control.records import NEVER_S, UNKNOWN
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
 from drivers.odrive.cansimple_axis import RESTART_SILENCE_S, CanSimpleAxis
@@ -49,7 +49,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._following = False  # commanded by this program
         self._expired_idle = self._expired = False
         self._absent = False  # position and velocity
-        self._turns, self._counted_s = 0.0, NEVER_S  # by the newest counts
+        self._turns, self._counted_s = UNKNOWN, NEVER_S  # by the newest counts
         self._idle_data = b""  # of the current
         self._measured_data = b""  # of the newest current
         self._version_answered = False

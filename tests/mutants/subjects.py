@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 EVERY_MUTANT = "not every_branch and not kernel and not on_a_port"  # the others need a subprocess or a kernel
+ODRIVE = "not every_axis or odrive"  # of the tests of every axis those with these drives
 
 
 class Subject(NamedTuple):
@@ -190,8 +191,29 @@ SUBJECTS = (
             "Lt to LtE in `-LARGEST_FLOAT < torque_nm < LARGEST_FLOAT`": "the largest binary32 is a little beyond it",
         },
     ),
-    Subject("drivers.odrive.axis", ("drivers/odrive/test_axis.py", "drivers/test_every_axis.py")),
-    Subject("drivers.odrive05.axis", ("drivers/odrive05/test_axis.py", "drivers/test_every_axis.py")),
+    Subject(
+        "drivers.odrive.axis",
+        ("drivers/odrive/test_drives.py", "drivers/odrive/test_axis.py", "drivers/test_every_axis.py"),
+        ODRIVE,
+        equivalent={
+            "always in `if (flags, disarm_reason) != (self._error_flags, self.disarm_reason):`": SPEED,
+        },
+    ),
+    Subject(
+        "drivers.odrive05.axis",
+        ("drivers/odrive05/test_axis.py", "drivers/test_every_axis.py"),
+        ODRIVE,
+        equivalent={
+            "always in `if flags != self._part_errors[part]:`": SPEED,
+            "always in `if not self._counts_known:`": SPEED,
+            "always in `if problem != self._counts_problem:`": SPEED,
+            "Gt to GtE in `now_s - self._angle_stamp_s > RESTART_SILENCE_S`": ROUNDED,
+            "Lt to LtE in `0.0 < elapsed_s < LONGEST_GAP_S`": ROUNDED,
+            "b'' to b'\\x01' in `self._measured_data = b''`": "a current has four bytes",
+            "without `self._version_answered = False` in `def reset(self) -> None:`": "a version sets it",
+            "False to True in `self._version_answered = False`": "a version sets it",
+        },
+    ),
     Subject(
         "drivers.drives",
         ("drivers/odrive/test_drives.py", "drivers/moteus/test_axis.py", "drivers/test_every_axis.py"),

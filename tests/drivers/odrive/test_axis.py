@@ -18,6 +18,8 @@ from drivers.odrive.codec import (
     GET_IQ,
     GET_VERSION,
     HEARTBEAT,
+    RX_SDO,
+    SDO_READ,
     TX_SDO,
     Message,
 )
@@ -205,15 +207,15 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     assert bench.request_watchdogs(0.0) == []  # its version is not known
     bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
-    assert isnan(bench.axis.settings.watchdog_s)
+    assert isnan(bench.health.watchdog_s)
     asked = [Frame(0x004, bytes.fromhex("00 db 00 00")), Frame(0x004, bytes.fromhex("00 da 00 00"))]
     assert bench.request_watchdogs(1.0) == asked
     bench.report_setting(218, timeout)
     bench.read(1.1)
-    assert isnan(bench.axis.settings.watchdog_s)
+    assert isnan(bench.health.watchdog_s)
     bench.report_setting(219, enable)
     bench.read(1.2)
-    assert bench.axis.settings.watchdog_s == pytest.approx(watchdog_s)
+    assert bench.health.watchdog_s == pytest.approx(watchdog_s)
     assert bench.request_watchdogs(2.0) == []
 
 
@@ -257,11 +259,13 @@ def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Benc
 
 def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench) -> None:
     bench.report(GET_VERSION, *PRO)
-    bench.report(ADDRESS, 0, 1, 2)
     bench.report_setting(BUILD.enable, "01")
     bench.report_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)
-    assert bench.axis.settings.watchdog_s == pytest.approx(0.1)
+    assert bench.health.watchdog_s == pytest.approx(0.1) and bench.health.serial_number == ""
+    bench.report(ADDRESS, 0, 1, 2)
+    bench.read(0.0)
+    assert (bench.health.supported_firmware, bench.health.serial_number) == ("0.6", "000200000001")
     asked = []
     for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
         bench.axis.request_settings(tick * PERIOD_S)
@@ -269,7 +273,18 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
     assert [count for count in asked if count] == [1 + 2] * 3  # the version, the flag and the time-out
     bench.report_setting(BUILD.enable, "00")
     bench.read(6.0)
-    assert bench.axis.settings.watchdog_s == 0.0
+    assert bench.health.watchdog_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("data", "commands"),
+    [(RX_SDO.encode(1, 100, 0) + bytes(4), 1), (RX_SDO.encode(SDO_READ, 100, 0), 0), (b"", 0)],
+    ids=["written", "read", "empty"],
+)
+def test_a_parameter_that_another_program_writes_is_its_command(bench: Bench, data: bytes, commands: int) -> None:
+    bench.far["left"].send(Frame(0x004, data))
+    bench.read(0.1)
+    assert bench.health.foreign_commands == commands
 
 
 def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(bench: Bench) -> None:
@@ -295,6 +310,17 @@ def test_any_message_after_a_silence_of_all_is_a_restart(
     bench.read(bench.now_s + 0.01)
     assert bench.health.restarts == restarts
     assert (bench.axis.settings.version is None) == bool(restarts)
+
+
+@pytest.mark.parametrize("message", AT_REST)
+def test_a_message_that_arrives_late_is_no_restart_where_its_stamp_says_so(bench: Bench, message: Message) -> None:
+    for each, values in AT_REST.items():
+        bench.report(each, *values, stamp_s=1.0)
+    for tick in range(50):
+        bench.read(1.0 + 0.01 * tick)
+    bench.report(message, *AT_REST[message], stamp_s=1.2)
+    bench.read(1.5)
+    assert bench.health.restarts == 0
 
 
 def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) -> None:

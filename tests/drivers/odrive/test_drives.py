@@ -108,7 +108,8 @@ def test_every_field_comes_from_its_message(bench: Bench) -> None:
     bench.heartbeat(error=0x1000000)
     state = bench.drives.read(2.0)[0]
     assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
-    assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
+    assert (state.temperature_c, state.bus_voltage_v, state.bus_current_a) == (40.0, 24.0, 1.0)
+    assert (state.temperature_stamp_s, state.bus_voltage_stamp_s) == (1.0, 1.0)
     bench.report(GET_ERROR, 0x2000000, 0x1000000)
     assert bench.drives.read(3.0)[0].error_flags == 0x2000000
     assert bench.axis.disarm_reason == 0x1000000

@@ -1,5 +1,6 @@
 """One ODrive with firmware 0.5 as a joint: counts before it has moved, held currents, errors, its watchdog."""
 
+from collections.abc import Callable
 from itertools import pairwise
 from math import isnan, pi
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 from control.rate import PERIOD_S
 from control.records import Joints
 from drivers.can.frames import Frame
+from drivers.drives import SUPPLY_TICKS, Drives
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
 from drivers.odrive05 import codec as codec05
@@ -20,6 +22,7 @@ COUNTS = Frame(arbitration_id(NODE, codec05.GET_ENCODER_COUNT), is_remote=True)
 VERSION = Frame(arbitration_id(NODE, codec.GET_VERSION), is_remote=True)
 CLEAR = Frame(arbitration_id(NODE, codec05.CLEAR_ERRORS))
 ZERO = Frame(arbitration_id(NODE, codec.SET_INPUT_TORQUE), bytes(4))
+TO_IDLE = Frame(arbitration_id(NODE, codec.SET_AXIS_STATE), bytes((1, 0, 0, 0)))
 IDLE, CLOSED_LOOP = 1, 8
 EXPIRED, ENCODER = codec05.ERROR_WATCHDOG, codec05.ERROR_ENCODER
 HEARTBEAT_TICKS = 38
@@ -107,16 +110,13 @@ def test_zeros_of_a_drive_in_closed_loop_are_a_position(bench: Bench) -> None:
     assert bench.now_s - bench.state.angle_stamp_s < PERIOD_S
 
 
-def test_a_joint_that_is_moved_has_the_velocity_between_two_counts(bench: Bench) -> None:
+def test_a_joint_that_is_moved_has_the_velocity_between_two_counts_unless_it_jumps() -> None:
+    bench = Bench(encoder_counts=4000)
     bench.run()
-    for _ in range(20):
-        assert bench.counts is not None
-        bench.counts += 20
+    for counts, moved in ((20, 20), (40, 20), (0, -40), (160, 160), (321, 0)):
+        bench.counts = counts
         bench.tick()
-    assert bench.state.velocity_rad_s == pytest.approx(20 / 8192 * 2.0 * pi / PERIOD_S)
-    bench.counts = 4000  # a jump
-    bench.tick()
-    assert bench.state.velocity_rad_s == 0.0
+        assert bench.state.velocity_rad_s == pytest.approx(moved / 4000 * 2.0 * pi / PERIOD_S)
 
 
 def test_a_joint_that_comes_to_rest_at_exactly_zero_has_no_velocity_since_its_old_counts(bench: Bench) -> None:
@@ -135,14 +135,43 @@ def test_a_joint_that_comes_to_rest_at_exactly_zero_has_no_velocity_since_its_ol
 def test_the_position_waits_until_the_watchdog_is_proven_and_the_drive_is_left_in_silence_once(bench: Bench) -> None:
     sent = []
     while isnan(bench.health.watchdog_s):
-        assert isnan(bench.state.angle_rad)
+        assert isnan(bench.state.angle_rad) and bench.now_s < 1.0
         sent.append(bench.tick())
-    assert bench.health.watchdog_s == 0.1 and bench.now_s < 1.0
+        bench.drives.request_settings(float(len(sent)))  # is due each time
+        for _ in range(SUPPLY_TICKS):
+            bench.drives.request_supply()
+        assert sent[-1] or not bench.commands()
+    assert bench.health.watchdog_s == 0.1
     silent = [not frames for frames in sent]
     assert sum(before and not after for before, after in pairwise(silent)) == 1
     assert sum(silent) > HEARTBEAT_TICKS
     assert all(bench.run(0.5))  # and never again
     assert not isnan(bench.state.angle_rad)
+
+
+@pytest.mark.parametrize(
+    ("command", "sent"),
+    [
+        (lambda drives: drives.disarm(0.0, at_once=True), [ZERO, TO_IDLE]),
+        (lambda drives: drives.clear_errors(), [CLEAR]),
+    ],
+    ids=["disarm", "clear errors"],
+)
+def test_a_command_ends_that_silence_or_that_it_is_to_follow_and_the_proof_begins_again(
+    bench: Bench, command: Callable[[Drives], None], sent: list[Frame]
+) -> None:
+    for arms in (False, True):
+        while bench.tick():
+            assert bench.now_s < 3.0
+        if arms:
+            bench.drives.arm(0.0, at_once=True)
+            bench.commands()
+            assert all(bench.run(0.5))
+        command(bench.drives)
+        assert bench.commands() == sent
+        assert bench.tick()
+    bench.run()
+    assert bench.health.watchdog_s == 0.1
 
 
 @pytest.mark.parametrize("poll", [False, True])
@@ -175,7 +204,9 @@ def test_a_watchdog_that_does_not_expire_is_off_until_errors_are_cleared(bench: 
     bench.run()
     assert bench.health.watchdog_s == 0.0
     bench.drives.clear_errors()
+    assert isnan(bench.health.watchdog_s)
     bench.run()
+    bench.drives.clear_errors()
     assert bench.health.watchdog_s == 0.1
 
 
@@ -190,6 +221,9 @@ def test_a_watchdog_that_expires_with_torque_on_is_an_error(bench: Bench) -> Non
 
 
 def test_arming_clears_a_watchdog_that_expired_while_idle_first(bench: Bench) -> None:
+    bench.drives.arm(bench.now_s, at_once=True)
+    assert CLEAR not in bench.commands()
+    bench.drives.disarm(bench.now_s, at_once=True)
     bench.run()
     assert bench.error == EXPIRED  # since the proof
     bench.drives.arm(bench.now_s, at_once=True)
@@ -209,11 +243,18 @@ def test_while_it_is_to_follow_no_silence_begins_even_where_arming_was_forced(be
     bench.commands()
     assert all(bench.run(0.5))
     bench.state_of_axis = CLOSED_LOOP
-    assert all(ZERO in frames for frames in bench.run(0.5))
+    assert all(ZERO in frames for frames in bench.run(0.2))
+    assert all(frames == [ZERO] for frames in bench.run(0.3))  # and no question
     assert isnan(bench.health.watchdog_s)
+    bench.state_of_axis, bench.expires = IDLE, True
+    bench.run()
+    assert bench.health.watchdog_s == 0.1
 
 
 def test_an_idle_drive_repeats_its_last_current_which_is_none(bench: Bench) -> None:
+    bench.report(codec.GET_IQ, 2.0, 2.5)
+    bench.read()
+    assert bench.state.current_a == 0.0
     bench.state_of_axis = CLOSED_LOOP
     bench.run(0.2)
     for current_a in (2.0, 2.5, 2.5):
@@ -266,6 +307,10 @@ def test_the_encoder_s_direction_turns_currents_into_the_sign_of_torque_and_posi
 
 
 def test_errors_of_the_parts_are_named_and_only_where_they_have_failed(bench: Bench) -> None:
+    bench.parts = (1, 1, 1)
+    bench.run(0.2)
+    assert bench.health.errors == "motor failed, encoder failed, controller failed"
+    bench.parts = (0, 0, 0)
     bench.report(codec05.GET_MOTOR_ERROR, 0x8)
     bench.report(codec05.GET_ENCODER_ERROR, 0x4)
     bench.report(codec05.GET_CONTROLLER_ERROR, 0x1)
@@ -276,11 +321,18 @@ def test_errors_of_the_parts_are_named_and_only_where_they_have_failed(bench: Be
     assert bench.state.error_flags == codec05.ERROR_MOTOR | codec05.ERROR_CONTROLLER
     named = "motor failed, controller failed; motor: gate driver fault; controller: overspeed"
     assert bench.health.active_errors == bench.health.errors == named
+    bench.report(codec05.GET_MOTOR_ERROR, 0x10)
+    bench.read()
+    assert "motor: control deadline missed" in bench.health.errors
+    bench.parts = (0, 1, 0)
+    bench.run(0.2)
+    assert bench.health.errors == "encoder failed; encoder: no response"
 
 
 def test_a_drive_that_answers_for_its_counts_and_not_for_its_version_has_this_firmware(bench: Bench) -> None:
     assert (bench.health.firmware, bench.health.firmware_supported) == ("", False)
     bench.drives.request_settings(1.0)
+    bench.drives.request_settings(1.1)
     assert bench.commands() == [VERSION, COUNTS]
     bench.report(codec05.GET_ENCODER_COUNT, 0, 0)
     bench.read()
@@ -297,6 +349,7 @@ def test_a_drive_with_a_version_has_another_firmware(bench: Bench) -> None:
         bench.drives.request_settings(now_s)
     assert set(bench.commands()) <= {VERSION, COUNTS}  # firmware 0.5 would take a question for its id as a new one
     assert bench.drives.refused_commands == 0
+    assert (bench.health.firmware, bench.health.firmware_supported) == ("0.5", True)  # it was not repeated
 
 
 @pytest.mark.parametrize(
@@ -307,20 +360,20 @@ def test_a_version_counts_until_it_is_not_repeated(bench: Bench, version: tuple[
     for _ in range(5):
         bench.report(codec.GET_VERSION, *version)
         while VERSION not in bench.tick(poll=True):
-            assert not bench.health.firmware_supported
+            assert not bench.health.firmware_supported and bench.now_s < 20.0
+        assert not bench.health.firmware_supported
     bench.run(longest_s, poll=True)
     assert (bench.health.firmware, bench.health.firmware_supported) == ("0.5", True)
 
 
-def test_counts_that_do_not_fit_the_position_name_the_key(bench: Bench) -> None:
+def test_counts_that_do_not_fit_the_position_name_the_key() -> None:
+    bench = Bench(encoder_counts=4000)
+    bench.state_of_axis = CLOSED_LOOP
     bench.run()
-    bench.estimates, bench.counts = (1.5, 0.0), round(1.5 * 8192)
-    for problem in (False, True):
-        bench.tick()
-        bench.report(codec05.GET_ENCODER_COUNT, bench.counts, 0)
+    for counts, problem in ((0, False), (-200, False), (-201, True)):
+        bench.report(codec05.GET_ENCODER_COUNT, counts, 0)
         bench.read()
-        assert ("encoder_counts = 8192" in bench.health.setting_problem) is problem
-        bench.counts = round(1.5 * 4000)
+        assert ("encoder_counts = 4000" in bench.health.setting_problem) is problem
 
 
 @pytest.mark.parametrize("estimates", [(1.5, 0.0), (0.0, 0.0)])
@@ -338,16 +391,38 @@ def test_a_garbled_position_or_count_is_no_problem_once_they_fit_again(
     assert bench.health.setting_problem == ""
 
 
-def test_a_restart_forgets_what_was_proven(bench: Bench) -> None:
+def test_a_restart_forgets_what_was_proven_and_that_it_was_to_follow(bench: Bench) -> None:
     bench.run()
+    bench.drives.arm(bench.now_s)
     for _ in range(200):
         bench.read()
+    bench.report(codec.GET_ENCODER_ESTIMATES, 0.0, 0.0, stamp_s=bench.state.angle_stamp_s + 0.1)
+    bench.read()
+    assert bench.health.restarts == 0  # it was delayed
+    bench.commands()
     bench.error = 0
     bench.run(0.15)
     assert bench.health.restarts == 1
     assert isnan(bench.health.watchdog_s)
     bench.run()
     assert bench.health.watchdog_s == 0.1 and bench.health.firmware_supported
+    bench.drives.reset()
+    assert isnan(bench.health.watchdog_s) and not bench.health.firmware_supported
+
+
+@pytest.mark.parametrize("reports_zeros", [False, True])
+def test_a_first_count_is_a_position_and_no_velocity_if_the_drive_has_an_error_and_reports_no_position(
+    bench: Bench, reports_zeros: bool
+) -> None:
+    for count in (0, 20):
+        bench.drives.reset()
+        bench.report(codec05.HEARTBEAT, ENCODER, IDLE, 0, 0, 0)
+        if reports_zeros:
+            bench.report(codec.GET_ENCODER_ESTIMATES, 0.0, 0.0)
+        bench.report(codec05.GET_ENCODER_COUNT, count, 0)
+        bench.read()
+    assert isnan(bench.state.angle_rad) is not reports_zeros
+    assert not bench.state.velocity_rad_s > 0.0
 
 
 def test_zeros_after_a_restart_are_no_position_although_the_last_heartbeat_said_closed_loop(bench: Bench) -> None:
@@ -356,13 +431,13 @@ def test_zeros_after_a_restart_are_no_position_although_the_last_heartbeat_said_
     bench.run(0.5)
     for _ in range(200):
         bench.read()
-    bench.state_of_axis, bench.estimates, bench.counts = IDLE, (0.0, 0.0), 2458
+    bench.state_of_axis, bench.estimates, bench.counts = IDLE, (0.0, 0.0), 4096
     for _ in range(2 * HEARTBEAT_TICKS):
         bench.tick()
         assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and not bench.state.closed_loop
         assert bench.health.setting_problem == ""
     bench.run()
-    assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and bench.health.setting_problem == ""
+    assert bench.state.angle_rad == pytest.approx(pi) and bench.health.setting_problem == ""
     assert bench.health.restarts == 1
 
 
