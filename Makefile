@@ -49,7 +49,7 @@ watch-pictures: .venv/test  ## draw the screen of `watch` for its page
 wheel: .venv/test  ## build the wheel, check its files, and walk the demo from it in an empty environment
 	@$(BIN)/python -m verification.wheel
 
-mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tests must notice each change
+mutants: .venv/test  ## change what keeps the robot safe in 4200 places; its tests must notice each change
 	$(BIN)/python -m tests.mutants $(ARGS)
 
 dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operators; every promise must hold
