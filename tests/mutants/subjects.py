@@ -20,6 +20,7 @@ CONTINUOUS = "it has the same value there from both sides"
 ONE_EACH = "each of them has one value for each joint"
 NO_STRIDE = "no stride has either number, nor the one before a stride"
 NO_NUMBER = "neither of them is finite either"
+NEAR_LARGEST = "the largest binary32 is a little beyond it"
 MORE_OFTEN = "the same counters are only read more often"
 ROUNDED = "a sum of such times never is exactly the bound"
 SAME = "the same value replaces itself"
@@ -188,7 +189,7 @@ SUBJECTS = (
         ("drivers/moteus/test_axis.py", "drivers/test_every_axis.py"),
         equivalent={
             "Lt to LtE in `self._read_s - self._disturbed_s < STOPPING_S`": ROUNDED,
-            "Lt to LtE in `-LARGEST_FLOAT < torque_nm < LARGEST_FLOAT`": "the largest binary32 is a little beyond it",
+            "Lt to LtE in `-LARGEST_FLOAT < torque_nm < LARGEST_FLOAT`": NEAR_LARGEST,
         },
     ),
     Subject(
@@ -267,20 +268,21 @@ SUBJECTS = (
     ),
     Subject(
         "drivers.odrive.cansimple_axis",
-        ("drivers/odrive/test_axis.py", "drivers/odrive/test_drives.py"),
-        functions=("_receive_encoder", "_receive_current", "_receive_state", "_on_silence", "_on_restart"),
+        ("drivers/odrive/test_drives.py", "drivers/odrive/test_axis.py", "drivers/test_every_axis.py"),
+        ODRIVE,
         equivalent={
             **{
-                f"{change} in `{test}`": REPORTED
+                f"Gt to GtE in `now_s - self._{stamp}_stamp_s > RESTART_SILENCE_S`": ROUNDED
                 for stamp in ("angle", "current", "heartbeat")
-                for change, test in (
-                    ("always", f"if now_s - self._{stamp}_stamp_s > RESTART_SILENCE_S:"),
-                    ("Gt to GtE", f"now_s - self._{stamp}_stamp_s > RESTART_SILENCE_S"),
-                    ("to Add", f"now_s - self._{stamp}_stamp_s"),
-                )
             },
-            "Gt to GtE in `self._read_before_s - heard_s > RESTART_SILENCE_S`": CONTINUOUS,
+            "Gt to GtE in `self._read_before_s - heard_s > RESTART_SILENCE_S`": ROUNDED,
+            "Lt to LtE in `-LARGEST_FLOAT < torque_nm < LARGEST_FLOAT`": NEAR_LARGEST,
             "to Sub in `turns + turns_s`": NO_NUMBER,
+            "always in `if busy_state != self.busy_state:`": SPEED,
+            "to Div in `self._sign * parameters.current_sign`": "both are 1 or -1",
+            "3.4e+38 to 3.4e+38 in `LARGEST_FLOAT = 3.4e+38`": NEAR_LARGEST,
+            "without `self.reset()` in `def __init__(self, joint: str, parameters: OdriveParameters, outlet: Outlet,"
+            " settings: Dri`": "the drives reset all of them at the start",
         },
     ),
 )

@@ -147,6 +147,15 @@ def test_a_duplicate_is_forgotten_when_one_of_the_drives_is_removed(bench: Bench
     assert not bench.health.duplicate_id
 
 
+def test_a_reset_forgets_a_duplicate_and_a_calibration(bench: Bench) -> None:
+    bench.live(2.0, drives=2, turns=(0.1, 0.4))
+    bench.heartbeat(4)
+    bench.read(2.1)
+    assert bench.health.duplicate_id and bench.health.busy_state
+    bench.axis.reset()
+    assert not bench.health.duplicate_id and not bench.health.busy_state
+
+
 @pytest.mark.parametrize("period_s", [0.02, 0.1, 0.5])
 def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
     bench = Bench(heartbeat_period_s=period_s)

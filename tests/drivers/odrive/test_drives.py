@@ -216,6 +216,7 @@ def test_arming_sends_mode_limits_gain_zero_torque_and_closed_loop_in_that_order
         Frame(0x04E, bytes.fromhex("00000000")),
         Frame(0x047, bytes.fromhex("08000000")),
     ]
+    assert bench.drives.refused_commands == 0
 
 
 def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
@@ -258,7 +259,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
     bench.drives.arm(1.0)
     bench.sent()
     bench.drives.disarm(1.0, at_once=True)
-    assert not bench.drives.gate.is_open
+    assert not bench.drives.gate.is_open and bench.drives.refused_commands == 0
     assert bench.sent() == {
         "left": [Frame(0x00E, bytes(4)), Frame(0x007, b"\1\0\0\0"), Frame(0x02E, bytes(4)), Frame(0x027, b"\1\0\0\0")],
         "right": [Frame(0x06E, bytes(4)), Frame(0x067, b"\1\0\0\0"), Frame(0x04E, bytes(4)), Frame(0x047, b"\1\0\0\0")],
@@ -304,13 +305,16 @@ def test_forcing_idle_closes_the_gate_and_reaches_the_drives_of_a_bus_next_to_on
     assert not bench.drives.gate.is_open
 
 
-def test_the_drives_are_asked_for_their_supply_one_after_the_other_every_tenth_tick(bench: Bench) -> None:
-    bench.drives.read(1.0)
+def test_drives_that_do_not_report_their_supply_are_asked_one_after_the_other_every_tenth_tick(bench: Bench) -> None:
+    bench.report(GET_BUS_VOLTAGE_CURRENT, 24.0, 1.0, joint="left_adduction", stamp_s=1.0)
+    bench.drives.read(1.25)
     asked = []
     for tick in range(1, 51):
+        if tick == 50:
+            bench.drives.read(1.26)
         bench.drives.request_supply()
         asked += [(tick, frame.arbitration_id) for frames in bench.sent().values() for frame in frames]
-    assert asked == [(10, 0x037), (20, 0x077), (30, 0x057), (40, 0x017), (50, 0x037)]
+    assert asked == [(20, 0x077), (30, 0x057), (40, 0x017), (50, 0x037)]
 
 
 def test_closed_drives_hear_nothing_any_more(bench: Bench) -> None:
@@ -333,9 +337,10 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
         "left": [Frame(0x000, is_remote=True), Frame(0x020, is_remote=True)],
         "right": [Frame(0x060, is_remote=True), Frame(0x040, is_remote=True)],
     }
-    bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
-    bench.drives.read(1.1)
-    assert bench.axis.settings.version == (0, 6, 11)
+    for firmware, data in (("0.6.10", "02 04 04 3a 00 06 0a 00"), ("0.6.11", "02 04 04 3a 00 06 0b 00")):
+        bench.far["left"].send(Frame(0x000, bytes.fromhex(data)))
+        bench.drives.read(1.1)
+        assert bench.health.firmware == firmware
     bench.drives.request_settings(1.0 + 0.99 * REPEAT_UNKNOWN_S)
     assert bench.silent()
     bench.drives.request_settings(1.01 + REPEAT_UNKNOWN_S)
