@@ -126,6 +126,12 @@ class Arm:
             mass.adduction_inertia_kg_m2,
         )
 
+    def coast(self, dt_s: float) -> None:
+        """Move on without any force."""
+        self._turn(dt_s, self.sweep_velocity_rad_s, self.adduction_velocity_rad_s)
+        for belt in self.belts:
+            belt.angle_rad += dt_s * belt.velocity_rad_s
+
     def _transmit(self, dt_s: float, sweep_nm: float, lift_nm: float) -> tuple[float, float]:
         """Turn the motors for a step; return the torques of their belts on the arm."""
         sweep, lift = self.belts
@@ -187,6 +193,10 @@ class Arm:
             sweep_rad_s = slowed(sweep_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
         if lift_dry_nm:
             lift_rad_s = slowed(lift_rad_s, dt_s * lift_dry_nm / lift_inertia_kg_m2)
+        self._turn(dt_s, sweep_rad_s, lift_rad_s)
+
+    def _turn(self, dt_s: float, sweep_rad_s: float, lift_rad_s: float) -> None:
+        """Turn the joints at these velocities, as far as their stops."""
         self.sweep_rad, self.sweep_velocity_rad_s = _moved(self.sweep_rad, sweep_rad_s, dt_s, END_STOPS_RAD[0])
         self.adduction_rad, self.adduction_velocity_rad_s = _moved(
             self.adduction_rad, lift_rad_s, dt_s, END_STOPS_RAD[1]
@@ -231,6 +241,12 @@ class Plant:
         self.body.put_down()
         for arm in self.arms:
             arm.put_back(self.body_m)
+
+    def coast(self, dt_s: float) -> None:
+        """Move joints and body on without any force: for time that a simulation has lost."""
+        for arm in self.arms:
+            arm.coast(dt_s)
+        self.body.forward_m += dt_s * self.body.forward_m_s
 
     @property
     def body_m(self) -> float:

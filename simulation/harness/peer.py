@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from control.monitors.encoder_monitor import LONGEST_GAP_S
 from drivers.can.bus_lock import BusRole, BusTakenError
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
@@ -28,7 +29,7 @@ from simulation.mud.track import COMPARTMENT_M, Track
 
 STEP_S = 0.002  # the period of the drives' fastest messages
 WATCHDOG_S = 0.25  # of the simulated drives, on processors that all processes share
-LONGEST_CATCH_UP_S = 0.02  # a robot that was delayed for longer skips that time: its commands waited meanwhile
+LONGEST_CATCH_UP_S = 0.005  # in longer delays a loop without new samples pushes ever harder
 PRIORITY = 1  # of real time
 NICENESS = -10
 
@@ -60,7 +61,10 @@ class Peer:
         self.close()
 
     def step(self, now_s: float) -> None:
-        if now_s - self.robot.now_s > LONGEST_CATCH_UP_S:
+        """Simulate until now; a robot that was delayed only coasts in that time, as far as monitors look back."""
+        elapsed_s = now_s - self.robot.now_s
+        if elapsed_s > LONGEST_CATCH_UP_S:
+            self.robot.plant.coast(min(elapsed_s, LONGEST_GAP_S))
             self.robot.now_s = now_s
         self.robot.advance(now_s)
         self._pose.step(now_s, self.robot.plant)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from control.monitors.encoder_monitor import LONGEST_GAP_S
 from control.records import JOINTS
 from drivers.drive import DriveParameters
 from drivers.odrive.axis import OdriveAxis
@@ -15,7 +16,7 @@ from drivers.odrive.parameters import OdriveParameters
 from firmware_host.buses import open_ports
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
-from simulation.harness.peer import WATCHDOG_S, Ground, Peer, simulate, take_precedence, track_of
+from simulation.harness.peer import LONGEST_CATCH_UP_S, WATCHDOG_S, Ground, Peer, simulate, take_precedence, track_of
 from simulation.harness.world import World
 
 HELD_UP_S = 4.0 * WATCHDOG_S
@@ -71,13 +72,25 @@ def test_commands_that_waited_while_the_robot_was_held_up_feed_its_watchdogs(ben
     assert bench.energised == {True}
 
 
-def test_joints_do_not_move_on_in_time_that_the_robot_has_lost(bench: Bench) -> None:
+def test_time_that_the_robot_has_lost_only_moves_joints_and_body_on_at_their_speeds(bench: Bench) -> None:
+    robot, plant = bench.peer.robot, bench.peer.robot.plant
+    left, right = plant.arms
+    plant.put_back()
+    left.sweep_velocity_rad_s, right.adduction_velocity_rad_s, plant.body.forward_m_s = 2.0, 1.0, 0.1
+    before_rad, robot.now_s = right.adduction_rad, bench.now_s
+    bench.step(0.01)
+    assert left.sweep_rad == pytest.approx(0.02) and plant.body_m == pytest.approx(0.001)
+    bench.step(0.5)  # no monitor looks back further than LONGEST_GAP_S
+    assert left.sweep_rad == pytest.approx(2.0 * (0.01 + LONGEST_GAP_S))
+    assert right.adduction_rad - before_rad == pytest.approx(0.01 + LONGEST_GAP_S)
+    assert robot.now_s == bench.now_s
+
+
+def test_what_the_robot_can_catch_up_with_is_simulated(bench: Bench) -> None:
     for axis in bench.axes:
         axis.send_torque(0.5)
     before = bench.peer.robot.plant.angles_rad
-    bench.step(0.5)
-    assert bench.peer.robot.plant.angles_rad == before
-    bench.step(0.01)
+    bench.step(0.9 * LONGEST_CATCH_UP_S)
     assert bench.peer.robot.plant.angles_rad != before
 
 
