@@ -5,7 +5,9 @@ that of a robot: nothing in it says that the drives are simulated, only that the
 all processes share, signals arrive less punctually than on a robot, so their bounds are wider.
 """
 
+import ctypes
 import json
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from drivers.can.run_folder import make_own_folder, run_folder, write_private_fi
 from simulation.devices.drive_types import PUBLISHED_NUMBERS
 from simulation.harness.drive_presets import mark_calibrated
 
+FEW_PROCESSORS = 2  # as of a virtual machine; a slow computer with more needs one for each of both
 HEAD = """\
 # A robot whose drives are simulated on local buses.
 
@@ -54,6 +57,9 @@ timeout = 1
 
 """
 TAIL = """\
+[loop]
+cpu = {cpu}  # of only two for the simulated robot too: a host that halts a processor halts both, none is out of step
+
 [faults]
 late_s = 0.5
 quiet_s = 0.5
@@ -133,11 +139,11 @@ def write_local_setup(folder: Path, logs: Path, text: str = "") -> Path:
 
 
 def configuration_text(folder: Path, logs: Path) -> str:
-    return CONFIGURATION.format(**_paths(folder, logs))
+    return CONFIGURATION.format(**_local_values(folder, logs))
 
 
-def _paths(folder: Path, logs: Path) -> dict[str, str]:
-    """Return paths as JSON strings, which are TOML strings too."""
+def _local_values(folder: Path, logs: Path) -> dict[str, str]:
+    """Return paths as JSON strings, which are TOML strings too, and of only two processors the one that runs this."""
     paths = {
         "left": folder / "left",
         "right": folder / "right",
@@ -145,7 +151,9 @@ def _paths(folder: Path, logs: Path) -> dict[str, str]:
         "status": folder / "mudskipper.sock",
         "pose": folder / "pose.sock",
     }
-    return {name: json.dumps(str(path)) for name, path in paths.items()}
+    values = {name: json.dumps(str(path)) for name, path in paths.items()}
+    few = len(os.sched_getaffinity(0)) <= FEW_PROCESSORS
+    return values | {"cpu": str(ctypes.CDLL(None).sched_getcpu() if few else -1)}
 
 
 def with_simulated_watchdogs(text: str) -> str:
@@ -174,7 +182,7 @@ def local_copy(text: str, folder: Path, logs: Path) -> str:
         document.get("status", {}).pop(group, None)
     if document.get("emergency_stop", {}).get("source") in ("gpio", "key"):  # likewise
         del document["emergency_stop"]
-    local = tomllib.loads(TAIL.format(**_paths(folder, logs)))
+    local = tomllib.loads(TAIL.format(**_local_values(folder, logs)))
     _add_watchdogs(document)
     if document.get("pose", {}).get("source") not in (None, "", "none"):
         local["pose"]["source"] = "socket"

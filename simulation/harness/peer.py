@@ -95,16 +95,20 @@ class Ground(NamedTuple):
         return load_world(self.world) if self.world else World(track_of(self.waters or list(MUDS)))
 
 
-def take_precedence() -> None:
-    """Raise this process's priority where it is permitted: a real robot does not wait for its computer.
+def take_precedence(cpu: int) -> None:
+    """Raise this process's priority where it is permitted, on the daemon's processor if that has one.
 
-    On a single processor it stays out of real time: a simulation that cannot keep up would block all other processes.
+    A real robot does not wait for its computer. On a single processor it stays out of real time: a simulation that
+    cannot keep up would block all other processes.
     """
     with suppress(PermissionError):
         if len(os.sched_getaffinity(0)) > 1:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         else:
             os.nice(NICENESS)
+    with suppress(OSError):  # of another computer's configuration
+        if cpu >= 0:
+            os.sched_setaffinity(0, {cpu})
 
 
 def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], object] = bool) -> int:
@@ -124,7 +128,7 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
         return _refuse(f"{problem}. 'mudskipper simulate {remedy}")
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
-    take_precedence()
+    take_precedence(configuration.loop.cpu)
     peer.run()
     return 0
 

@@ -34,7 +34,7 @@ def robots(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedRobot]:
         ending.close()
 
     monkeypatch.setattr(peer.Peer, "run", run)
-    monkeypatch.setattr(peer, "take_precedence", lambda: None)
+    monkeypatch.setattr(peer, "take_precedence", lambda cpu: None)
     monkeypatch.setattr("signal.signal", lambda *_: None)
     return made
 
@@ -110,7 +110,7 @@ def test_an_operator_moves_the_flippers_back_and_presses_the_emergency_stop(
 
     robots: list[SimulatedRobot] = []
     setup = str(write_local_setup(short_folder, short_folder))
-    monkeypatch.setattr(peer, "take_precedence", lambda: None)
+    monkeypatch.setattr(peer, "take_precedence", lambda cpu: None)
     monkeypatch.setattr(peer, "Peer", HandedPeer)
     numbers = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGTERM, signal.SIGINT)
     before = [signal.getsignal(number) for number in numbers]

@@ -143,7 +143,7 @@ def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_retur
 def test_a_daemon_without_its_bus_waits_if_configured(short_folder: Path, tmp_path: Path) -> None:
     path = write_local_setup(short_folder, tmp_path / "logs")
     text = path.read_text(encoding="utf-8").replace('interface = "mudskipper_local"', 'interface = "socketcan"')
-    path.write_text(text + "\n[loop]\nwait_for_bus = true\n", encoding="utf-8")
+    path.write_text(text.replace("[loop]", "[loop]\nwait_for_bus = true"), encoding="utf-8")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as daemon:
         report = wait_for_status(short_folder / "mudskipper.sock", daemon)

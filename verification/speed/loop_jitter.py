@@ -82,8 +82,8 @@ def summary_of(turns: Sequence[Report]) -> Report:
 def processors_awake(robot: LocalRobot, held: bool) -> Iterator[list[str]]:
     """Keep the processors awake, or let them sleep, for the daemon too; yield a warning where that is refused."""
     text = robot.configuration.read_text(encoding="utf-8")
-    setting = f"\n[loop]\nstay_awake = {str(held).lower()}\n"
-    robot.configuration.write_text(text + setting, encoding="utf-8")
+    setting = f"[loop]\nstay_awake = {str(held).lower()}\n"
+    robot.configuration.write_text(text.replace("[loop]\n", setting), encoding="utf-8")
     processors = AwakeProcessors(held)
     processors.update(held)
     try:

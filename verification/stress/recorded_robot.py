@@ -59,9 +59,10 @@ def main() -> int:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--config", type=Path, required=True)
     path = parser.parse_args().config
-    peer = Peer(load_configuration(path), World(track_of(list(MUDS))), seed=1)
+    configuration = load_configuration(path)
+    peer = Peer(configuration, World(track_of(list(MUDS))), seed=1)
     signal.signal(signal.SIGTERM, peer.end)
-    take_precedence()
+    take_precedence(configuration.loop.cpu)
     with open(path.with_name(RECORD), "wb", buffering=0) as file:
         peer.robot.observers.append(MotorRecord(peer.robot, file).add_step)
         peer.run()

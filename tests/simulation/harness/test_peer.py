@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock, call
 
 import pytest
 
@@ -107,6 +108,24 @@ def test_a_robot_obeys_signals_as_soon_as_it_is_announced(short_folder: Path) ->
     assert process.exitcode == 0
 
 
+def test_a_host_that_halts_one_of_two_processors_halts_both_the_robot_and_its_daemon(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cpu_of(processors: set[int]) -> int:
+        monkeypatch.setattr("os.sched_getaffinity", lambda _: processors)
+        return load_configuration(write_local_setup(short_folder, short_folder / "logs")).loop.cpu
+
+    assert cpu_of({0, 1, 2, 3}) == -1
+    cpu = cpu_of({0, 1})
+    assert cpu >= 0
+    monkeypatch.setattr("os.sched_setscheduler", lambda *_: None)
+    pin = Mock(side_effect=[None, OSError("it is that of another computer")])
+    monkeypatch.setattr("os.sched_setaffinity", pin)
+    for each in (cpu, cpu, -1):
+        take_precedence(each)
+    assert pin.mock_calls == [call(0, {cpu})] * 2
+
+
 @pytest.mark.parametrize(("processors", "expected"), [({0}, ["nice"]), ({0, 1}, ["real time"])], ids=["one", "two"])
 def test_a_lone_processor_is_not_taken_in_real_time(
     monkeypatch: pytest.MonkeyPatch, processors: set[int], expected: list[str]
@@ -115,5 +134,5 @@ def test_a_lone_processor_is_not_taken_in_real_time(
     monkeypatch.setattr("os.sched_getaffinity", lambda _: processors)
     monkeypatch.setattr("os.sched_setscheduler", lambda *_: taken.append("real time"))
     monkeypatch.setattr("os.nice", lambda _: taken.append("nice"))
-    take_precedence()
+    take_precedence(-1)
     assert taken == expected
