@@ -37,7 +37,7 @@ from simulation.mud.disturbances import LAB
 
 Backend = Literal["direct", "lockstep", "daemon"]
 ACTION = {  # its range by name; -1 and 1 of an action are the ends
-    "depth_m": (0.010, 0.045),
+    "depth_m": (0.010, 0.050),
     "sweep_angle_deg": (15.0, 35.0),
     "stance_speed_m_s": (0.2, 0.8),
 }

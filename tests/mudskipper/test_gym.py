@@ -58,7 +58,7 @@ def test_a_stride_has_the_ordered_depth_and_sweep_and_advances_the_body() -> Non
             sweep_deg = lockstep.loop.controller.gait.next_parameters.sweep_angle_deg
             assert sweep_deg == pytest.approx(ACTION["sweep_angle_deg"][int(action[1] > 0.0)])
         assert not (over or fault)
-        assert felt[9] == pytest.approx(2.75, abs=0.5)  # cm of depth: the middle of its range
+        assert felt[9] == pytest.approx(3.0, abs=0.5)  # cm of depth: the middle of its range
         assert advanced_m == pytest.approx(info["body_m"] - begun_m) and advanced_m > 0.08
         lockstep.late_ticks = 1000
         _, _, fault, _, info = walk.step(np.zeros(3, np.float32))
