@@ -58,7 +58,7 @@ timeout = 1
 """
 TAIL = """\
 [loop]
-cpu = {cpu}  # of only two for the simulated robot too: a host that halts a processor halts both, none is out of step
+cpu = {cpu}  # the simulated robot runs there too: a host that halts one of two processors halts both or none
 
 [faults]
 late_s = 0.5
@@ -143,7 +143,7 @@ def configuration_text(folder: Path, logs: Path) -> str:
 
 
 def _local_values(folder: Path, logs: Path) -> dict[str, str]:
-    """Return paths as JSON strings, which are TOML strings too, and of only two processors the one that runs this."""
+    """Return paths as JSON strings, which are TOML strings too, and, of two processors, the one that runs this."""
     paths = {
         "left": folder / "left",
         "right": folder / "right",
