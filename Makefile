@@ -9,11 +9,13 @@ SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --qu
 unexport PYTHONDONTWRITEBYTECODE
 
 # These tests run a robot in real time, which takes a part of a processor: nothing else runs next to two of them. What
-# fails runs once more, alone: a computer that halts for a moment fails a test too, and a defect fails it twice.
+# fails is repeated alone, twice at most: a computer that halts for a moment fails a test too, a defect each time.
 REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/live/test_restarts.py experiments/calibration/test_weights_daemon.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py mudskipper/test_gym_daemon.py)
 
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist worksteal --durations=10 -o faulthandler_timeout=1800 -o faulthandler_exit_on_timeout=true
+
+REPEAT = $(PYTEST) --numprocesses 0 --last-failed $(REAL_TIME) $(ARGS)
 
 # Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
@@ -30,7 +32,7 @@ demo: .venv/setup  ## walk a simulated robot over three muds, in real time
 
 test: .venv/test  ## run all tests without network: first those that compute, then those in real time
 	@$(PYTEST) --ignore=tests/bench $(addprefix --ignore=,$(REAL_TIME)) $(ARGS); computing=$$?; \
-	$(PYTEST) $(REAL_TIME) $(ARGS) || $(PYTEST) --numprocesses 0 --last-failed $(REAL_TIME) $(ARGS); real_time=$$?; \
+	$(PYTEST) $(REAL_TIME) $(ARGS) || $(REPEAT) || $(REPEAT); real_time=$$?; \
 	echo "exit status: computing tests $$computing, real-time tests $$real_time"; \
 	test $$computing -eq 0 -a $$real_time -eq 0
 
