@@ -36,9 +36,7 @@ def simulated_configuration(
 
     It is parsed from text, so that the log contains it. Raises ConfigurationError.
     """
-    text = configuration_template(rig).format(
-        left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""', cpu=-1
-    )
+    text = configuration_template(rig).format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
     lines = [f"{line}\n{drive}" if drive and line.startswith("[drive.") else line for line in text.splitlines()]
     return parse_configuration(with_drive_type("\n".join([*lines, "", sections]), drive_type))
 

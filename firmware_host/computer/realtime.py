@@ -19,7 +19,7 @@ def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
     """Apply all settings; return a warning for each that is refused."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1)  # ns, where an ordinary process may be woken 50 us late
-    warnings = [_pin(cpu) if cpu >= 0 else "", _lock_memory() if lock_memory else "", _schedule(priority)]
+    warnings = [pin(cpu) if cpu >= 0 else "", _lock_memory() if lock_memory else "", _schedule(priority)]
     freeze_garbage()
     return [warning for warning in warnings if warning]
 
@@ -31,7 +31,8 @@ def freeze_garbage() -> None:
     gc.disable()
 
 
-def _pin(cpu: int) -> str:
+def pin(cpu: int) -> str:
+    """Run on this processor alone; return a warning where that is refused."""
     try:
         os.sched_setaffinity(0, {cpu})
     except OSError as problem:

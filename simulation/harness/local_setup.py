@@ -56,10 +56,12 @@ enable = 2
 timeout = 1
 
 """
-TAIL = """\
+LOOP = """\
+
 [loop]
 cpu = {cpu}  # the simulated robot runs there too: a host that halts one of two processors halts both or none
-
+"""
+TAIL = """\
 [faults]
 late_s = 0.5
 quiet_s = 0.5
@@ -139,7 +141,7 @@ def write_local_setup(folder: Path, logs: Path, text: str = "") -> Path:
 
 
 def configuration_text(folder: Path, logs: Path) -> str:
-    return CONFIGURATION.format(**_local_values(folder, logs))
+    return (CONFIGURATION + LOOP).format(**_local_values(folder, logs))
 
 
 def _local_values(folder: Path, logs: Path) -> dict[str, str]:
@@ -182,7 +184,7 @@ def local_copy(text: str, folder: Path, logs: Path) -> str:
         document.get("status", {}).pop(group, None)
     if document.get("emergency_stop", {}).get("source") in ("gpio", "key"):  # likewise
         del document["emergency_stop"]
-    local = tomllib.loads(TAIL.format(**_local_values(folder, logs)))
+    local = tomllib.loads((TAIL + LOOP).format(**_local_values(folder, logs)))
     _add_watchdogs(document)
     if document.get("pose", {}).get("source") not in (None, "", "none"):
         local["pose"]["source"] = "socket"

@@ -17,11 +17,13 @@ from typing import NamedTuple
 from control.monitors.encoder_monitor import LONGEST_GAP_S
 from drivers.can.bus_lock import BusRole, BusTakenError
 from firmware_host.buses import BusError, lock_buses, open_ports
+from firmware_host.computer.realtime import pin
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.ticker import Ticker
 from simulation.devices.pose_broadcast import PoseBroadcast
 from simulation.harness.blocks import on_blocks
+from simulation.harness.local_setup import FEW_PROCESSORS
 from simulation.harness.robot import SimulatedRobot
 from simulation.harness.world import World, load_world
 from simulation.mud.clay import MUDS
@@ -96,19 +98,19 @@ class Ground(NamedTuple):
 
 
 def take_precedence(cpu: int) -> None:
-    """Raise this process's priority where it is permitted, on the daemon's processor if that has one.
+    """Raise this process's priority where it is permitted, and of few processors take the one that the daemon has.
 
     A real robot does not wait for its computer. On a single processor it stays out of real time: a simulation that
     cannot keep up would block all other processes.
     """
+    processors = len(os.sched_getaffinity(0))
     with suppress(PermissionError):
-        if len(os.sched_getaffinity(0)) > 1:
+        if processors > 1:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         else:
             os.nice(NICENESS)
-    with suppress(OSError):  # of another computer's configuration
-        if cpu >= 0:
-            os.sched_setaffinity(0, {cpu})
+    if cpu >= 0 and processors <= FEW_PROCESSORS:
+        pin(cpu)  # refused where it is a processor of another computer
 
 
 def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], object] = bool) -> int:

@@ -10,7 +10,7 @@ from experiments.actuator.file_change import FileChangeError, changed_text, repl
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.local_setup import CONFIGURATION
 
-LOCAL = CONFIGURATION.format(left='"l"', right='"r"', logs='"logs"', status='"s"', pose='""', cpu=-1)
+LOCAL = CONFIGURATION.format(left='"l"', right='"r"', logs='"logs"', status='"s"', pose='""')
 CONSTANT = ("drive", "right_sweep", "torque_constant_nm_a")
 FRICTION = ("friction", "right_sweep", "coulomb_nm")
 

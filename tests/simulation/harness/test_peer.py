@@ -123,6 +123,8 @@ def test_a_host_that_halts_one_of_two_processors_halts_both_the_robot_and_its_da
     monkeypatch.setattr("os.sched_setaffinity", pin)
     for each in (cpu, cpu, -1):
         take_precedence(each)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1, 2, 3})
+    take_precedence(cpu)  # of a robot's own configuration
     assert pin.mock_calls == [call(0, {cpu})] * 2
 
 
