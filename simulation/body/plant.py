@@ -126,11 +126,12 @@ class Arm:
             mass.adduction_inertia_kg_m2,
         )
 
-    def coast(self, dt_s: float) -> None:
-        """Move on without any force."""
-        self._turn(dt_s, self.sweep_velocity_rad_s, self.adduction_velocity_rad_s)
+    def come_to_rest(self, dt_s: float) -> None:
+        self._turn(dt_s, self.sweep_velocity_rad_s / 2.0, self.adduction_velocity_rad_s / 2.0)
+        self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = 0.0
         for belt in self.belts:
-            belt.angle_rad += dt_s * belt.velocity_rad_s
+            belt.angle_rad += dt_s * belt.velocity_rad_s / 2.0
+            belt.velocity_rad_s = 0.0
 
     def _transmit(self, dt_s: float, sweep_nm: float, lift_nm: float) -> tuple[float, float]:
         """Turn the motors for a step; return the torques of their belts on the arm."""
@@ -242,11 +243,12 @@ class Plant:
         for arm in self.arms:
             arm.put_back(self.body_m)
 
-    def coast(self, dt_s: float) -> None:
-        """Move joints and body on without any force: for time that a simulation has lost."""
+    def come_to_rest(self, dt_s: float) -> None:
+        """Slow joints and body down evenly in time that a simulation has lost: they go half of the way."""
         for arm in self.arms:
-            arm.coast(dt_s)
-        self.body.forward_m += dt_s * self.body.forward_m_s
+            arm.come_to_rest(dt_s)
+        self.body.forward_m += dt_s * self.body.forward_m_s / 2.0
+        self.body.forward_m_s = 0.0
 
     @property
     def body_m(self) -> float:

@@ -63,10 +63,14 @@ class Peer:
         self.close()
 
     def step(self, now_s: float) -> None:
-        """Simulate until now; a robot that was delayed only coasts in that time, as far as monitors look back."""
+        """Simulate until now.
+
+        In time that the simulation has lost the robot comes to rest. That agrees with the mean of two speeds, by which
+        monitors judge an angle, and no joint gains energy against its torque; none looks back beyond LONGEST_GAP_S.
+        """
         elapsed_s = now_s - self.robot.now_s
         if elapsed_s > LONGEST_CATCH_UP_S:
-            self.robot.plant.coast(min(elapsed_s, LONGEST_GAP_S))
+            self.robot.plant.come_to_rest(min(elapsed_s, LONGEST_GAP_S))
             self.robot.now_s = now_s
         self.robot.advance(now_s)
         self._pose.step(now_s, self.robot.plant)
