@@ -289,7 +289,7 @@ class FlipperEstimator(StrideEstimator):
         force_n, force_error_n = yield_force_n(self.geometry, stance.batches, shear, stride.friction_error_nm)
         yield
         self.fits = self.fits._replace(
-            k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
+            k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear, stance.mirrored),
             k_e=partial(extraction_samples, self.geometry, rising, surface, extraction.first_m),
         )
         outward = OUTWARD_UNCERTAINTY if stride.along_path and self.base is Base.FREE else 0.0

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from control.geometry import FlipperGeometry
 from control.modes import Mode
+from control.mud_estimate import FlipperEstimate
 from control.parameters.arm_mass import ArmMass
 from control.records import FLIPPERS, JOINTS, BodyPose, Phase, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters, Method
@@ -58,6 +59,7 @@ class Replay:
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
     fits: tuple[StrideFits, ...] = ()  # that the estimates come from, one for each stride
+    remembered: tuple[FlipperEstimate, ...] = ()  # what the robot knew before each stride closed
     chosen_depths_m: tuple[float, ...] = ()  # after each stride, by the robot itself; NaN where the log does not say
 
 
@@ -118,6 +120,7 @@ class RunningReplay:
         self._estimator = MudEstimator(*known, body.body_drag_n, rig, body.body_mass_kg)
         self._strides: list[StrideEstimate] = []
         self._fits: list[StrideFits] = []
+        self._remembered: list[FlipperEstimate] = []
         self._mode_before = -1
 
     def add(self, ticks: Ticks) -> None:
@@ -125,11 +128,12 @@ class RunningReplay:
         estimator, walking = self._estimator, int(Mode.WALKING)
         rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
         for now_s, mode, phase, body_x_m, *signals in rows:
-            states = recorded_states(now_s, *signals)
+            states, known = recorded_states(now_s, *signals), estimator.mud_estimate
             reading = estimator.update(now_s, PHASES[phase], states, BodyPose(now_s, body_x_m))
             for stride in reading.strides:
                 self._strides.append(stride)
                 self._fits.append(_packed(estimator.fits_of(stride.flipper)))
+                self._remembered.append(known.of(stride.flipper))
             if mode == walking and self._mode_before != walking:
                 estimator.reset()
             self._mode_before = mode
@@ -145,6 +149,7 @@ class RunningReplay:
             segments_before(log),
             begin_s(log),
             fits=tuple(self._fits),
+            remembered=tuple(self._remembered),
             chosen_depths_m=tuple(chosen_m.get((stride.flipper, stride.t_start_s), nan) for stride in strides),
         )
 
@@ -154,7 +159,7 @@ def _packed(fits: StrideFits) -> StrideFits:
     packed: list[FitSamples | None] = []
     for found in (samples() for samples in fits):
         columns = [array("d", values) for values in found[:-1]] if found else []
-        packed.append(FitSamples(columns[0], columns[1], columns[2], found.slope) if found else None)
+        packed.append(FitSamples._make([*columns, found.slope]) if found else None)
     return StrideFits(*(partial(_stored, each) for each in packed))
 
 
@@ -178,19 +183,22 @@ def replay_lab(
 ) -> Replay:
     """Replay with `lab_estimator`."""
     estimator = lab_estimator(lab, configuration, method, surface_error_m)
-    found = [
-        (stride, estimator.fits_of(stride.flipper))
-        for _, reading in lab_readings(estimator, lab)
-        for stride in reading.strides
-        if stride.flipper in lab.flippers
-    ]
+    strides, fits, remembered, known = [], [], [], estimator.mud_estimate
+    for _, reading in lab_readings(estimator, lab):
+        for stride in reading.strides:
+            if stride.flipper in lab.flippers:
+                strides.append(stride)
+                fits.append(estimator.fits_of(stride.flipper))
+                remembered.append(known.of(stride.flipper))
+        known = estimator.mud_estimate
     return Replay(
-        [stride for stride, _ in found],
+        strides,
         lab.flippers,
         estimator.map.rows(),
         begin_s=float(lab.stamp_s[0]),
         findings=lab.findings,
-        fits=tuple(fits for _, fits in found),
+        fits=tuple(fits),
+        remembered=tuple(remembered),
     )
 
 

@@ -20,6 +20,8 @@ class FitSamples(NamedTuple):
     moments_m4: Sequence[float]
     torques_nm: Sequence[float]  # of the mud, against the motion
     weights_m: Sequence[float]  # travel
+    sweeps_rad: Sequence[float]
+    depths_m: Sequence[float]  # of the middle of the lower edge, below the surface
     slope: float  # the fitted coefficient, N/m³
 
     @property

@@ -153,14 +153,20 @@ def yield_force_n(
 
 
 def shear_samples(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, shear: Shear
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, shear: Shear, mirrored: bool = False
 ) -> FitSamples | None:
-    """Return the samples of the fit that `find_shear` found; None for a bound."""
+    """Return the samples of the fit that `find_shear` found; None for a bound. `mirrored`: front is rear in batches."""
     if shear.fit is None or not shear.steady:
         return None
     steady = [batches[i] for i in shear.steady]
-    moments = [_moment_m4(geometry, batch, surface_m) for batch in steady]
-    return FitSamples(moments, [batch.sweep_nm for batch in steady], [1.0] * len(steady), shear.fit.slope)
+    return FitSamples(
+        moments_m4=[_moment_m4(geometry, batch, surface_m) for batch in steady],
+        torques_nm=[batch.sweep_nm for batch in steady],
+        weights_m=[1.0] * len(steady),
+        sweeps_rad=[-batch.sweep_rad if mirrored else batch.sweep_rad for batch in steady],
+        depths_m=[geometry.depth_m(batch.sweep_rad, batch.adduction_rad) - surface_m for batch in steady],
+        slope=shear.fit.slope,
+    )
 
 
 def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:

@@ -34,7 +34,7 @@ class Stroke:
     __slots__ = (
         "_body", "_clipped", "_lift", "_n", "_start_m", "_start_s", "_sweep", "_swept", "_travel",
         "_turned",
-        "batches", "first_m", "step_m",
+        "batches", "first_m", "mirrored", "step_m",
     )  # fmt: skip
 
     def __init__(self, step_m: float) -> None:
@@ -43,6 +43,7 @@ class Stroke:
 
     def reset(self) -> None:
         self.batches: list[Batch] = []
+        self.mirrored = False
         self.first_m = UNKNOWN  # travel of the first sample
         self._start_m = self._start_s = 0.0
         self._empty()
@@ -101,6 +102,7 @@ class Stroke:
 
     def mirror(self) -> None:
         """Turn a stroke that pushes the body backward into the one that pushes it forward: front and rear change."""
+        self.mirrored = True
         self.batches = [
             batch._replace(
                 travel_m=-batch.travel_m, sweep_rad=-batch.sweep_rad, sweep_nm=-batch.sweep_nm, body_m=-batch.body_m

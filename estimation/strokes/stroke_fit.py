@@ -90,7 +90,7 @@ def _samples(pieces: "_Pieces") -> FitSamples | None:
     if fit is None:
         return None
     moments, torques = ([a / sqrt(w) for a, w in zip(each, pieces.paths_m, strict=True)] for each in pieces[:2])
-    return FitSamples(moments, torques, pieces.paths_m, fit.slope)
+    return FitSamples(moments, torques, pieces.paths_m, pieces.sweeps_rad, pieces.depths_m, fit.slope)
 
 
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
@@ -137,6 +137,7 @@ class _Pieces(NamedTuple):
     depths_m: list[float]
     paths_m: list[float]
     speeds_m_s: list[float]
+    sweeps_rad: list[float]
     samples: int
     lever_m: float  # shortest vertical lever of the whole stroke
 
@@ -171,7 +172,8 @@ def _fit(
 def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
 ) -> Work[_Pieces]:
-    moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, samples, lever_m = [], [], [], [], [], [], 0, inf
+    moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, sweeps_rad = [], [], [], [], [], [], []
+    samples, lever_m = 0, inf
     travelled = zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True)
     for number, (batch, path_m) in enumerate(travelled, 1):
         if number % BATCHES_PER_UNIT == 0:
@@ -189,9 +191,10 @@ def _pieces(
         depths_m.append(max(batch.travel_m - surface.depth_m, path_m / 2.0))
         paths_m.append(path_m)
         speeds_m_s.append(batch.speed_m_s)
+        sweeps_rad.append(batch.sweep_rad)
         samples += batch.samples
     yield
-    return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, samples, lever_m)
+    return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, speeds_m_s, sweeps_rad, samples, lever_m)
 
 
 def travels_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:

@@ -5,7 +5,7 @@ from typing import Any
 from control.gait.stride_table import stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_path import GaitPath
-from experiments.pictures.robot_sketch import draw_view, prepare
+from experiments.pictures.robot_sketch import draw_view, prepare, show_scales
 from experiments.pictures.side_view import SideView, view_from_side
 from experiments.reports.style import FAINT, TRAIL
 
@@ -33,10 +33,7 @@ def draw_gait(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> Any:
     draw_view(panel, _view(geometry, rows[-1].sweep_end_rad, rows[-1].depth_end_m), "left")
     panel.legend(loc="upper left", frameon=False)
     panel.set_title(f"{path.name}: lower edge of the plate, stride depth {100.0 * depth_m:g} cm")
-    panel.axis("on")
-    panel.set(xlabel="forward of the axles (cm)", ylabel="above the mud (cm)")
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_formatter(lambda at_m, _: f"{100.0 * at_m:zg}")
+    show_scales(panel)
     return figure
 
 

@@ -23,6 +23,14 @@ def prepare(panel: Axes, left_m: float, right_m: float, deepest_m: float, highes
     panel.plot([left_m, right_m], [0.0, 0.0], color=SURFACE, linewidth=1.4)
 
 
+def show_scales(panel: Axes) -> None:
+    """Label a prepared panel in centimetres, for paths that count from the axles."""
+    panel.axis("on")
+    panel.set(xlabel="forward of the axles (cm)", ylabel="above the mud (cm)")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter(lambda at_m, _: f"{100.0 * at_m:zg}")
+
+
 def body_position_m(walk: RecordedWalk, row: int) -> float:
     """Return the position of the body, interpolated between known ones; zero without any pose."""
     if np.isfinite(walk.body_x_m[row]):

@@ -16,6 +16,7 @@ from pandas import DataFrame
 
 from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
+from experiments.pictures.robot_sketch import prepare, show_scales
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, mark_of, name_muds
 from experiments.reports.style import FAINT, WIDTH_IN, say_empty
@@ -24,6 +25,7 @@ from experiments.run_report.results import SPEED, Entry, run_labels
 from experiments.run_report.run import Run
 
 Floats = NDArray[np.float64]
+Layer = tuple[Floats, Floats, str, dict[str, Any]]  # forward and down in m, the colours' values, their label and scale
 CM4, N_CM = 1e8, 100.0  # in m⁴, and in N·m
 MOST_DRAWN = 10  # strides of each mud, evenly over the run
 MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
@@ -32,6 +34,8 @@ INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their ra
 NARROW_IN, HEIGHT_IN = 6.0, 7.2  # with one flipper
 DRAWN_OF_FIT = ("torques_nm", "residuals_nm")
 MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
+MARGIN_M = 0.015  # around the deepest path
+MOST_PERCENT = 50.0  # of a prediction's error that has a colour of its own
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
 
 
@@ -126,6 +130,52 @@ def _share_scales(panels: Sequence[Axes], heights: Sequence[Floats]) -> None:
     for panel, own in zip(panels, heights, strict=True):
         if outside := int(np.sum((own < bottom) | (own > top))):
             panel.annotate(f"{outside} beyond", (0.98, 0.02), xycoords="axes fraction", ha="right", size=7, color=FAINT)
+
+
+def draw_paths(run: Run) -> Figure:
+    """Draw where the plates' lower edges went, in the colour of the force and in that of the prediction's error."""
+    figure = Figure(figsize=(WIDTH_IN, 3.2))
+    layers, half_m = (_felt_n(run), _prediction_errors_percent(run)), run.walks[0].geometry.flipper_length_m
+    deepest_m = max([0.0, *layers[0][0][:, 1], *layers[1][0][:, 1]])
+    for panel, (places, colours, label, look) in zip(figure.subplots(1, 2), layers, strict=True):
+        prepare(panel, -half_m, half_m, deepest_m + MARGIN_M, MARGIN_M)
+        show_scales(panel)
+        if len(places):
+            marks = panel.scatter(places[:, 0], -places[:, 1], 5.0, colours, zorder=3, rasterized=True, **look)
+            figure.colorbar(marks, ax=panel, location="bottom", label=label)
+        else:
+            say_empty(panel, "no stride that earlier ones predict")
+    return figure
+
+
+def _felt_n(run: Run) -> Layer:
+    """Return the force of the mud on the plate in all rows below the surface; in a stance only along the track."""
+    sides = [side for walk in run.walks for side in walk.sides]
+    length_m = run.walks[0].geometry.flipper_length_m
+    rows = [
+        np.stack([length_m * np.sin(side.sweep_angle_rad), side.depth_m, np.hypot(side.force_x_n, up_n)], axis=1)
+        for side in sides
+        for up_n in [np.nan_to_num(side.force_z_n)]
+    ]
+    below = np.concatenate(rows)
+    below = below[(below[:, 1] > 0.0) & np.isfinite(below).all(axis=1)]
+    top_n = float(np.percentile(below[:, 2], 100.0 - INSIDE)) if len(below) else 1.0
+    return below[:, :2], below[:, 2], "force of the mud (N)", {"cmap": "viridis", "vmin": 0.0, "vmax": top_n}
+
+
+def _prediction_errors_percent(run: Run) -> Layer:
+    """Return how much too large the torque is that the strides before let expect, of the largest one of a stride."""
+    length_m, drawn = run.walks[0].geometry.flipper_length_m, [np.empty((0, 3))]
+    known = run.estimates[run.estimates["samples"].notna() & run.estimates["expected_n_m3"].notna()]
+    for _, stride in known.groupby(["walk", "index", "flipper"], sort=False):
+        largest_nm = max(np.abs(each.torques_nm).max() for each in stride["samples"])
+        for samples, k_n_m3 in zip(stride["samples"], stride["expected_n_m3"], strict=True):
+            excess_nm = k_n_m3 * np.asarray(samples.moments_m4) - samples.torques_nm
+            ahead_m = length_m * np.sin(samples.sweeps_rad)
+            drawn.append(np.stack([ahead_m, samples.depths_m, 100.0 * excess_nm / largest_nm], axis=1))
+    places = np.concatenate(drawn)
+    look = {"cmap": "coolwarm", "vmin": -MOST_PERCENT, "vmax": MOST_PERCENT}
+    return places[:, :2], places[:, 2], "prediction minus torque (% of the largest of the stride)", look
 
 
 def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:

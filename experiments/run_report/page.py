@@ -21,7 +21,7 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
 from experiments.reports.validity_text import why_not_valid
 from experiments.reports.value_text import N_CM3, coefficient_text, value_text
-from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds
+from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, draw_paths, drawn_muds
 from experiments.run_report.results import (
     SHOWN,
     SPEED,
@@ -74,6 +74,11 @@ FITS = (
     "slope of a line is the coefficient of one stride. In a stance that moment hardly changes, so shear is drawn along "
     "the stroke, with the moment times the coefficient. At most ten strides of each mud are drawn."
 )
+PATHS = (
+    "Where the lower edges of the plates went in the mud, from the axles, all strides and flippers over each other. "
+    "Left: the force of the mud, in a stance its part along the track. Right: how much more torque the strides before "
+    "let expect than was felt, where a coefficient has a value: red is too much, blue too little."
+)
 R_SQUARED = (
     "R² is 1 - Σr²/Στ² of torques τ and residuals r, as usual for a line through the origin. R² about the mean has "
     "Σ(τ - τ̄)² in its place: below 0 a constant torque would explain the stroke better than the law. Residuals are "
@@ -115,6 +120,7 @@ def run_result(run: Run, headline: Entry) -> Result:
             texts["Fits"] = R_SQUARED
             tables.append(_table("Fits", quality_rows(run)))
             figures.append(Figure("fits", _fits_caption(run, headline), partial(draw_fits, run), "Fits"))
+            figures.append(Figure("paths", PATHS, partial(draw_paths, run), "Fits"))
         else:
             texts["Fits"] = "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
         if len(run.replay.flippers) > 1:

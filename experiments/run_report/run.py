@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
+from control.mud_estimate import FlipperEstimate
 from control.records import COEFFICIENTS, FLIPPERS, UNKNOWN
 from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from experiments.lablogs.log_choice import LABEL
@@ -39,7 +40,8 @@ AUTHORS = "the paper's authors"
 STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces", "supply_v")
 NUMBERS = ("value", "std_error", "repeatability", "depth_m", "speed_m_s")  # of an estimate; NaN where not known
 FLAGS = ("valid", "at_least")
-ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", *NUMBERS, *FLAGS, "reason", "samples")
+# expected_n_m3: by the strides before, at the same depth; NaN where these have no value
+ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", *NUMBERS, *FLAGS, "reason", "samples", "expected_n_m3")
 
 
 class MudsFrom(StrEnum):
@@ -190,27 +192,30 @@ def _describe_strides(walks: Sequence[RecordedWalk], layout: MudLayout | None) -
 def _describe_estimates(replay: Replay, walks: Sequence[RecordedWalk], strides: DataFrame) -> DataFrame:
     """Return the rows of ESTIMATES, those of one stride together."""
     starts_s = [walk.begun_s for walk in walks]
-    fits: dict[tuple[int, int, str], StrideFits] = {}
-    for replayed, of_stride in zip(replay.strides, replay.fits, strict=True):
+    fits: dict[tuple[int, int, str], tuple[StrideFits, FlipperEstimate]] = {}
+    for replayed, of_fits, known in zip(replay.strides, replay.fits, replay.remembered, strict=True):
         number = int(np.searchsorted(starts_s, replayed.t_end_s - replay.begin_s))
-        fits[number, replayed.index, replayed.flipper] = of_stride
+        fits[number, replayed.index, replayed.flipper] = of_fits, known
     muds = {(number, index): mud for number, index, mud in strides[["walk", "index", "mud"]].itertuples(index=False)}
     found = []
     for number, walk in enumerate(walks, 1):
         for row in sorted(walk.strides, key=lambda row: (int(row["index"]), row["flipper"])):
             index, flipper = row["index"], FLIPPERS[row["flipper"]]
             own = {"walk": number, "index": index, "mud": muds[number, index], "flipper": flipper}
-            of_stride = fits.get((number, index, flipper), NO_FITS)
+            of_stride, known = fits.get((number, index, flipper), (NO_FITS, FlipperEstimate()))
             for name in COEFFICIENTS:
-                samples = getattr(of_stride, name)()
+                samples, before, estimate = getattr(of_stride, name)(), getattr(known, name), estimate_of_row(row, name)
                 if not (samples and abs(samples.slope - row[name]) <= SAME * abs(row[name])):
                     samples = None  # of a bound, or this version would estimate otherwise
-                found.append(own | estimate_of_row(row, name) | {"samples": samples})
+                is_known = before is not None and not before.at_least
+                expected_n_m3 = before.at(estimate["depth_m"])[0] if is_known else UNKNOWN
+                found.append(own | estimate | {"samples": samples, "expected_n_m3": expected_n_m3})
     return estimate_frame(found)
 
 
 def estimate_frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
-    return DataFrame(rows, columns=list(ESTIMATES)).astype(dict.fromkeys(NUMBERS, float) | dict.fromkeys(FLAGS, bool))
+    kinds = dict.fromkeys((*NUMBERS, "expected_n_m3"), float) | dict.fromkeys(FLAGS, bool)
+    return DataFrame(rows, columns=list(ESTIMATES)).astype(kinds)
 
 
 def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudRegion], row: Stride) -> str:

@@ -24,6 +24,7 @@ from estimation.strokes.shear import (
     Base,
     Shear,
     find_shear,
+    shear_samples,
     sheared_stroke,
     slips_m,
     yield_force_n,
@@ -113,6 +114,15 @@ def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough(b
     shear = found(uneven, base)
     assert shear.fit == fit_through_origin([moment_m4(b) for b in reported], [b.sweep_nm for b in reported])
     assert shear.samples == 10 * len(reported)
+
+
+def test_the_samples_of_a_mirrored_stance_are_where_the_plate_was() -> None:
+    batches = sheared(poses())
+    forward, mirrored = (shear_samples(GEOMETRY, batches, 0.0, found(batches), mirrored=each) for each in (False, True))
+    assert forward and mirrored
+    assert forward.sweeps_rad == [batches[i].sweep_rad for i in found(batches).steady]
+    assert mirrored == forward._replace(sweeps_rad=[-each for each in forward.sweeps_rad])
+    assert forward.depths_m == pytest.approx([DEPTH_M] * len(forward.depths_m))
 
 
 def in_sand(rises_m: Sequence[float]) -> list[Batch]:

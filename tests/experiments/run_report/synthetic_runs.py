@@ -26,15 +26,20 @@ def stride(
     duration_s: float = nan,
     outcome: Outcome = Outcome.GOOD,
     samples: FitSamples | None = None,
+    expected_n_m3: float = nan,
     **flags: bool,
 ) -> StrideRows:
-    """Return a stride with the same value for each coefficient of a flipper; `samples` are those of k_p."""
+    """Return a stride with the same value for each coefficient of a flipper.
+
+    `samples` are those of k_p; earlier strides let expect `expected_n_m3`.
+    """
     own = {"walk": 1, "index": 0, "mud": mud}
     motion = {"start_s": 0.0, "duration_s": duration_s, "step_m": step_m, "depth_m": 0.03, "outcome": str(outcome)}
     estimates = [
         own
         | {"flipper": flipper, "coefficient": name, "samples": samples if name == "k_p" else None}
         | {"value": value, "std_error": STD_ERROR, "valid": True, "at_least": False, "reason": ""}
+        | {"expected_n_m3": expected_n_m3}
         | flags
         for flipper, value in zip(FLIPPERS, (left, right), strict=True)
         for name in COEFFICIENTS

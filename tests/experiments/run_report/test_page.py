@@ -1,5 +1,6 @@
 """Tables and pictures of a report show the fits with their residuals, and repeated events as one row each."""
 
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
@@ -10,14 +11,21 @@ from hypothesis import strategies as st
 
 from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.mud_layout import layout_of_lengths
-from experiments.run_report.figures import draw_fits
+from experiments.run_report.figures import draw_fits, draw_paths
 from experiments.run_report.page import group_events, quality_rows
 from experiments.run_report.run import Run, read_runs
 from logs.files.log_error import unwatched
 from tests.experiments.run_report.synthetic_runs import run_of, stride
 
 K = 1e6
-BY_HAND = FitSamples([1e-7, 2e-7, 3e-7], [0.2, 0.3, 0.7], [0.001] * 3, 2.0 * K)  # residuals 0, -0.1, 0.1 N·m
+BY_HAND = FitSamples(  # residuals 0, -0.1, 0.1 N·m
+    moments_m4=[1e-7, 2e-7, 3e-7],
+    torques_nm=[0.2, 0.3, 0.7],
+    weights_m=[0.001] * 3,
+    sweeps_rad=[0.5, 0.0, -0.5],
+    depths_m=[0.01, 0.02, 0.03],
+    slope=2.0 * K,
+)
 
 
 @pytest.fixture(scope="module")
@@ -69,11 +77,31 @@ def test_a_sample_far_off_is_counted_and_not_drawn() -> None:
     moments = np.linspace(1e-8, 3e-7, 60)
     torques = K * moments + 0.002 * np.cos(np.arange(60.0))
     torques[30] = -9.0
-    samples = FitSamples(moments.tolist(), torques.tolist(), [0.001] * 60, K)
+    same = [0.001] * 60
+    samples = FitSamples(moments.tolist(), torques.tolist(), same, same, same, K)
     fit, residuals, *_ = draw_fits(run_of([stride("a", samples=samples)])).axes
     for panel in (fit, residuals):
         assert panel.get_ylim()[0] > -900.0
         assert [text.get_text() for text in panel.texts] == ["1 beyond"]
+
+
+def test_a_path_has_the_force_and_the_error_of_the_prediction_where_the_plate_was(run: Run) -> None:
+    """Of 3 N/cm³ where 2 were felt, 0.1, 0.3 and 0.2 N·m are too much, of a largest torque of 0.7 N·m."""
+    estimates = run_of([stride("a", samples=BY_HAND, expected_n_m3=3.0 * K)]).estimates
+    force, error, *_ = draw_paths(replace(run, estimates=estimates)).axes
+    (felt,), (predicted,) = force.collections, error.collections
+    sides = [side for walk in run.walks for side in walk.sides]
+    in_mud = [(side.depth_m > 0.0) & np.isfinite(side.force_x_n) for side in sides]
+    assert len(np.asarray(felt.get_offsets())) == np.concatenate(in_mud).sum() > 100
+    length_m = run.walks[0].geometry.flipper_length_m
+    places = np.stack([length_m * np.sin(BY_HAND.sweeps_rad), np.negative(BY_HAND.depths_m)], axis=1)
+    np.testing.assert_allclose(np.asarray(predicted.get_offsets()), [*places, *places])  # of both flippers
+    np.testing.assert_allclose(np.asarray(predicted.get_array()), [100.0 / 7.0, 300.0 / 7.0, 200.0 / 7.0] * 2)
+
+
+def test_a_run_whose_strides_nothing_predicts_says_so(run: Run) -> None:
+    _, error, *_ = draw_paths(replace(run, estimates=run.estimates.assign(expected_n_m3=np.nan))).axes
+    assert not error.collections and "predict" in error.texts[0].get_text()
 
 
 # events
