@@ -238,4 +238,5 @@ def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
         noticed_s=noticed_s,
         findings=lab.findings,
         series=series,
+        fixed_base=lab.fixed_base,
     )

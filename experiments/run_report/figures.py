@@ -5,6 +5,8 @@ moment, hardly changes: shear is drawn along its stroke instead, with a line of 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from math import nan
 from typing import Any
 
@@ -16,7 +18,9 @@ from pandas import DataFrame
 
 from control.records import COEFFICIENTS
 from estimation.strokes.fit_samples import FitSamples
+from experiments.pictures.recorded_walk import in_detail
 from experiments.pictures.robot_sketch import prepare, show_scales
+from experiments.reports.coefficient_table import GatheredCoefficient
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, draw_coefficient, looks_of, mark_of, name_muds
 from experiments.reports.style import FAINT, WIDTH_IN, say_empty
@@ -35,6 +39,9 @@ NARROW_IN, HEIGHT_IN = 6.0, 7.2  # with one flipper
 DRAWN_OF_FIT = ("torques_nm", "residuals_nm")
 MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
 MARGIN_M = 0.015  # around the deepest path
+GAMMA_DEG = np.linspace(-90.0, 90.0, 91)
+BIN_DEG, SEEN_FRACTION = 15.0, 0.05  # of the directions in which plates moved, and of their paths: corners have less
+SEEN_S, STEP_M = 60.0, 0.003  # of each walk, and of a path that has a direction: poses are known within 0.3 mm
 MOST_PERCENT = 50.0  # of a prediction's error that has a colour of its own
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
 
@@ -176,6 +183,64 @@ def _prediction_errors_percent(run: Run) -> Layer:
     places = np.concatenate(drawn)
     look = {"cmap": "coolwarm", "vmin": -MOST_PERCENT, "vmax": MOST_PERCENT}
     return places[:, :2], places[:, 2], "prediction minus torque (% of the largest of the stride)", look
+
+
+def draw_directions(run: Run, headline: Entry) -> Figure:
+    """Draw how each mud resists an upright plate by the direction of its motion; hatched where no plate moved.
+
+    At the angle γ below the horizontal clay presses with k_s across the plate, sand with k_s cos γ, and along it both
+    with (k_p - k_e + (k_p + k_e) sin γ) / 2.
+    """
+    figure, looks, unseen_deg = Figure(figsize=(WIDTH_IN, 3.6)), looks_of(drawn_muds(run)), _unseen_directions_deg(run)
+    across, along = figure.subplots(1, 2)
+    for result in [each for each in headline["muds"] if each["mud"] in looks]:
+        look, (k_p, k_s, k_e) = looks[result["mud"]], (result["both"][name] for name in COEFFICIENTS)
+        height = (k_s.value or nan) / N_CM3
+        across.plot(GAMMA_DEG, height * np.cos(np.radians(GAMMA_DEG)), "--", color=look["color"])
+        label = result["mud"].replace("k_p", "$k_p$")
+        across.plot(GAMMA_DEG, np.full_like(GAMMA_DEG, height), color=look["color"], label=label)
+        draw_coefficient(across, 0.0, k_s, look)
+        _draw_along(along, k_p, k_e, look)
+    for panel, name in ((across, "across the plate"), (along, "along the plate, up")):
+        panel.set(xlabel="direction of motion: up -90°, down 90°", ylabel=f"{name} (N/cm³)", xticks=range(-90, 91, 45))
+        for low_deg in unseen_deg:
+            panel.axvspan(low_deg, low_deg + BIN_DEG, facecolor="none", edgecolor=FAINT, hatch="///", linewidth=0)
+    figure.legend(loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+def _draw_along(panel: Axes, k_p: GatheredCoefficient, k_e: GatheredCoefficient, look: Mapping[str, Any]) -> None:
+    """Draw k_p of a plate that goes down, -k_e of one that goes up, and the law between them with two errors."""
+    draw_coefficient(panel, 90.0, k_p, dict(look))
+    if k_e.value is None:
+        return
+    draw_coefficient(panel, -90.0, replace(k_e, value=-k_e.value, trials=[-each for each in k_e.trials]), dict(look))
+    if k_p.value is not None and not (k_p.at_least or k_e.at_least):
+        down, up = (1.0 + np.sin(np.radians(GAMMA_DEG))) / 2.0, (1.0 - np.sin(np.radians(GAMMA_DEG))) / 2.0
+        height = (down * k_p.value - up * k_e.value) / N_CM3
+        error = 2.0 * np.hypot(down * (k_p.std_error or 0.0), up * (k_e.std_error or 0.0)) / N_CM3
+        panel.plot(GAMMA_DEG, height, color=look["color"])
+        panel.fill_between(GAMMA_DEG, height - error, height + error, color=look["color"], alpha=0.2, linewidth=0)
+
+
+def _unseen_directions_deg(run: Run) -> list[float]:
+    """Return where the bins begin in whose directions the lower edges hardly went through the mud."""
+    bins_deg = np.arange(-90.0, 90.0 + BIN_DEG, BIN_DEG)
+    seen_m = np.zeros(len(bins_deg) - 1)
+    for side in [side for walk in run.walks for side in in_detail(walk, [(0.0, SEEN_S)]).sides]:
+        body_m = np.zeros_like(side.body_x_m) if side.fixed_base else side.body_x_m
+        forward_m = body_m + side.geometry.flipper_length_m * np.sin(side.sweep_angle_rad)
+        edge_m = np.stack([forward_m, side.depth_m], axis=1)
+        known_m = edge_m[np.isfinite(edge_m).all(axis=1) & (side.time_s <= SEEN_S)]
+        passed_m = [*known_m[:1]]
+        for place_m in known_m:
+            if np.hypot(*(place_m - passed_m[-1])) >= STEP_M:
+                passed_m.append(place_m)
+        in_mud = [(a, b) for a, b in pairwise(passed_m) if min(a[1], b[1]) > 0.0]
+        moves_m = np.array([b - a for a, b in in_mud]).reshape(-1, 2)
+        gamma_deg = np.degrees(np.arctan2(moves_m[:, 1], np.abs(moves_m[:, 0])))
+        seen_m += np.histogram(gamma_deg, bins_deg, weights=np.hypot(*moves_m.T))[0]
+    return [float(low) for low in bins_deg[:-1][seen_m <= SEEN_FRACTION * seen_m.sum()]]
 
 
 def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:

@@ -21,7 +21,7 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
 from experiments.reports.validity_text import why_not_valid
 from experiments.reports.value_text import N_CM3, coefficient_text, value_text
-from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, draw_paths, drawn_muds
+from experiments.run_report.figures import N_CM, draw_comparison, draw_directions, draw_fits, draw_paths, drawn_muds
 from experiments.run_report.results import (
     SHOWN,
     SPEED,
@@ -79,6 +79,11 @@ PATHS = (
     "Left: the force of the mud, in a stance its part along the track. Right: how much more torque the strides before "
     "let expect than was felt, where a coefficient has a value: red is too much, blue too little."
 )
+DIRECTIONS = (
+    "How the mud resists an upright plate by the direction of its motion. Marks are the coefficients with two standard "
+    "errors. Between them the laws say: across the plate clay presses in any direction (line), sand along the motion "
+    "(dashes); along the plate both follow the sine. Hatched: no plate moved there, so only the laws speak."
+)
 R_SQUARED = (
     "R² is 1 - Σr²/Στ² of torques τ and residuals r, as usual for a line through the origin. R² about the mean has "
     "Σ(τ - τ̄)² in its place: below 0 a constant torque would explain the stroke better than the law. Residuals are "
@@ -121,6 +126,7 @@ def run_result(run: Run, headline: Entry) -> Result:
             tables.append(_table("Fits", quality_rows(run)))
             figures.append(Figure("fits", _fits_caption(run, headline), partial(draw_fits, run), "Fits"))
             figures.append(Figure("paths", PATHS, partial(draw_paths, run), "Fits"))
+            figures.append(Figure("directions", DIRECTIONS, partial(draw_directions, run, headline), "Fits"))
         else:
             texts["Fits"] = "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
         if len(run.replay.flippers) > 1:

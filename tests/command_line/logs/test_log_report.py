@@ -40,8 +40,8 @@ def test_the_page_shows_every_walk_stride_and_event(two_walks: Path, tmp_path: P
     assert report["summary"]["ticks"] == len(log.ticks) and report["log"] == [two_walks.name]
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert [each["joint"] for each in report["supply"]] == [*JOINTS] and "lowest supply (V)" in page
-    assert page.count("data:image/png") == 6  # two of each of the two walks, the fits, and the paths
-    pictures = {"walk-1", "walk-2", "strides-1", "strides-2", "fits", "paths"}
+    assert page.count("data:image/png") == 7  # two of each of the two walks, fits, paths, and directions
+    pictures = {"walk-1", "walk-2", "strides-1", "strides-2", "fits", "paths", "directions"}
     assert {path.stem for path in folder.glob("*.png")} == pictures
     assert (folder / "two.mcap").read_bytes() == two_walks.read_bytes()
 

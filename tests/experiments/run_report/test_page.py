@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
 
 from estimation.strokes.fit_samples import FitSamples
 from experiments.pictures.mud_layout import layout_of_lengths
-from experiments.run_report.figures import draw_fits, draw_paths
+from experiments.run_report.figures import GAMMA_DEG, draw_directions, draw_fits, draw_paths
 from experiments.run_report.page import group_events, quality_rows
+from experiments.run_report.results import headline_of
 from experiments.run_report.run import Run, read_runs
 from logs.files.log_error import unwatched
 from tests.experiments.run_report.synthetic_runs import run_of, stride
@@ -102,6 +106,27 @@ def test_a_path_has_the_force_and_the_error_of_the_prediction_where_the_plate_wa
 def test_a_run_whose_strides_nothing_predicts_says_so(run: Run) -> None:
     _, error, *_ = draw_paths(replace(run, estimates=run.estimates.assign(expected_n_m3=np.nan))).axes
     assert not error.collections and "predict" in error.texts[0].get_text()
+
+
+def curves_of(panel: Axes) -> list[NDArray[np.float64]]:
+    """Return the heights of the lines over all directions."""
+    return [height for line in panel.lines if len(height := np.asarray(line.get_ydata())) == len(GAMMA_DEG)]
+
+
+def test_the_mud_by_direction_is_that_of_the_coefficients_and_hatched_where_no_plate_moved(run: Run) -> None:
+    """Flippers go down, across and up: a path of 15° to 75° below the horizontal is only what the law says."""
+    headline = headline_of(run)
+    (mud,) = headline["muds"]
+    across, along = draw_directions(run, headline).axes
+    (height,) = curves_of(along)
+    assert height[-1] == pytest.approx(mud["both"]["k_p"].value / 1e6)
+    assert height[0] == pytest.approx(-mud["both"]["k_e"].value / 1e6)
+    sand, clay = curves_of(across)
+    assert clay[0] == clay[45] == sand[45] == pytest.approx(mud["both"]["k_s"].value / 1e6)
+    assert sand[15] == pytest.approx(clay[15] / 2.0)  # at -60°
+    for panel in (across, along):
+        hatched = {patch.get_x() for patch in panel.patches if isinstance(patch, Rectangle)}
+        assert {15.0, 30.0, 45.0, 60.0} <= hatched and not hatched & {-90.0, 0.0, 75.0}
 
 
 # events
