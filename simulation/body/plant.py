@@ -244,11 +244,10 @@ class Plant:
             arm.put_back(self.body_m)
 
     def come_to_rest(self, dt_s: float) -> None:
-        """Slow joints and body down evenly in time that a simulation has lost: they go half of the way."""
+        """Slow the joints down evenly in time that a simulation has lost, over half of their way; the body goes on."""
         for arm in self.arms:
             arm.come_to_rest(dt_s)
-        self.body.forward_m += dt_s * self.body.forward_m_s / 2.0
-        self.body.forward_m_s = 0.0
+        self.body.forward_m += dt_s * self.body.forward_m_s
 
     @property
     def body_m(self) -> float:

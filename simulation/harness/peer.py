@@ -65,7 +65,7 @@ class Peer:
     def step(self, now_s: float) -> None:
         """Simulate until now.
 
-        In time that the simulation has lost the robot comes to rest. That agrees with the mean of two speeds, by which
+        In time that the simulation has lost the joints come to rest. That agrees with the mean of two speeds, by which
         monitors judge an angle, and no joint gains energy against its torque; none looks back beyond LONGEST_GAP_S.
         """
         elapsed_s = now_s - self.robot.now_s
