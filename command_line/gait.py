@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
 from command_line.errors import CommandError
-from command_line.operation.operation import Depths
+from command_line.operation.operation import Adaptive, Depths
 from command_line.screen import complain
 from command_line.shared_options import Seed
 from control.gait.stride_table import crutching_parameters, stride_table
@@ -55,9 +55,8 @@ def check(
     if problems := [*problems, *gait_problems(path, configuration, path.depths_m)]:
         raise ConfigurationError(problems)
     print(table(_phases(path, configuration, depth_m)))
-    needs_depth = f" at {100.0 * depth_m:g} cm: without depths_m it needs --depth to walk" * (not path.depths_m)
-    is_crutching = crutching_parameters(path)
-    print("\nthe crutching gait: its depth can adapt to the mud" if is_crutching else f"\naccepted{needs_depth}")
+    adapts = f" at {100.0 * depth_m:g} cm; without --depth its depth adapts to the mud" * (not path.depths_m)
+    print("\nthe crutching gait" + adapts if crutching_parameters(path) else "\naccepted" + adapts)
     if out:
         from experiments.pictures.gait_picture import draw_gait  # matplotlib is slow to import
 
@@ -86,6 +85,7 @@ def simulate(
     config: Robot = None,
     mud: Annotated[str, Option("water content", metavar="W", choices=tuple(MUDS))] = "53.1",
     depth: Depths = (),
+    adaptive: Adaptive = False,
     strides: Annotated[int, Option("number of strides", low=1, high=1000)] = 5,
     seed: Seed = 1,
 ) -> int:
@@ -95,6 +95,8 @@ def simulate(
     lockstep = Lockstep(configuration, track, seed, disturbances=TRACKWAY, fixed_base=fixed_base)
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
     document = gait_document(gait)
+    if adaptive:
+        document.pop("depths_m", None)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
         depths = {"depths_m": [each / 100.0 for each in depth]} if depth else {}

@@ -318,7 +318,8 @@ class Controller:
             gait.step(0.0 if stands and flipper not in stuck else dt_s, flipper not in stuck)
             for flipper, gait in gaits.items()
         ]
-        later.next_depth_m = self.order.depth_of(later.stride + 1)
+        adaptive = self.order.adaptive
+        later.next_depth_m = self.gait.next_depth_m if adaptive else self.order.depth_of(later.stride + 1)
         self.target = targets[0]._replace(phase=Phase.STROKE)
         wanted: JointTargets = Joints(*(joint for target in targets for joint in self._follow(target)[:2]))
         waits_for = [flipper for flipper in stuck if gaits[flipper].waits]

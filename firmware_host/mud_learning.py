@@ -25,7 +25,7 @@ from control.faults import Fault, FaultKind
 from control.geometry import FlipperGeometry
 from control.parameters.adaptation_parameters import AdaptationParameters, Method
 from control.parameters.gait_parameters import GaitParameters
-from control.parameters.gait_path import GaitPhase
+from control.parameters.gait_path import GaitPath, GaitPhase
 from control.records import NO_LOAD, UNKNOWN, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator
 from estimation.stride_clock import STROKES
@@ -90,14 +90,20 @@ class MudLearning:
         self._rig = configuration.rig
         self._lowest_v = [inf] * len(configuration.rig.joints)  # since the last stride closed
 
-    def _adapt_to(self, gait: GaitParameters) -> None:
-        """Choose strides of this gait from now on; their candidates are computed before the first one."""
+    def _adapt_to(self, gait: GaitParameters | GaitPath) -> None:
+        """Choose strides of this gait from now on; their candidates are computed before the first one.
+
+        The methods `paper` and `gait` know the crutching gait only, so paths have the default one.
+        """
         configuration, self._gait = self._configuration, gait
-        method = METHODS[configuration.adaptation.method]
-        self.adaptation = method(configuration.adaptation, configuration.geometry, gait, configuration.rig)
+        known = configuration.adaptation, configuration.geometry
+        if isinstance(gait, GaitPath):
+            self.adaptation: Adaptation = DepthAdaptation(*known, configuration.gait, configuration.rig, gait)
+        else:
+            self.adaptation = METHODS[configuration.adaptation.method](*known, gait, configuration.rig)
         self.estimator.work.add(self.adaptation.prepare())
 
-    def reset(self, depth_m: float, gait: GaitParameters | None = None) -> None:
+    def reset(self, depth_m: float, gait: GaitParameters | GaitPath | None = None) -> None:
         """Start a new walk with this gait or the configured one; earlier strides stay stored.
 
         Unfinished work is dropped, so call `finish` before.

@@ -20,24 +20,32 @@ Mud can be too soft to be felt: the torques of the stance are then those of fric
 thrust. A body that stays where it is will do so at the same depth, so the next stride is deeper by a quarter, also
 where no pose shows whether it stays.
 
+A path of a gait file is searched in the same way. It is taken for its whole motion in the mud, and its plates rise
+from where they are deepest; flippers that push in turn make a step each.
+
 The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its width and depth.
 """
 
 from collections.abc import Sequence
-from math import isfinite
+from dataclasses import replace
+from math import degrees, isfinite
 from typing import NamedTuple, Protocol
 
 from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
-from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
-from control.gait.stride_table import stride_duration_s
+from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of, motion_of_path
+from control.gait.stride_table import stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 DEEPER = 1.25  # of a depth at which mud was not felt: half as much force again, since it grows with the depth squared
+PARTS = 4  # of each row of a path that are tried for reach; a half ellipse has its peak at the second
+ALIKE = 0.03  # of the speed of a path: its forecast is no better
+LEVEL_M = 0.0005  # of depth, within which a path is at its deepest
 DEPTHS_PER_UNIT, STEPS_PER_UNIT, EXTRACTIONS_PER_UNIT = 3, 4, 4  # of bounded work: less than half a tick
 
 
@@ -86,9 +94,30 @@ def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait
     return tuple(low_m + i * GRID_M for i in range(count))
 
 
-def make_candidate(geometry: FlipperGeometry, gait: GaitParameters, depth_m: float) -> Candidate:
-    motion = motion_of(gait, geometry, depth_m)
-    return Candidate(depth_m, gait, stride_duration_s(gait, geometry, depth_m), motion)
+def path_depths(parameters: AdaptationParameters, geometry: FlipperGeometry, path: GaitPath) -> tuple[float, ...]:
+    """Return the depths of the grid at which all of a path is in reach."""
+    grid_m = depth_grid(parameters, geometry, GaitParameters(sweep_angle_deg=0.0))
+    places = {depth_m: _places(path, geometry, depth_m) for depth_m in grid_m}
+    return tuple([depth_m for depth_m in grid_m if all([geometry.is_reachable(*at) for at in places[depth_m]])])
+
+
+def _places(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> list[tuple[float, float]]:
+    rows = stride_table(path, geometry, depth_m)
+    return [row.at(part / PARTS)[:2] for row in rows for part in range(PARTS + 1)]
+
+
+def rising_deg(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> float:
+    """Return the sweep from the middle at which the plates leave the deepest part of a path."""
+    places = _places(path, geometry, depth_m)
+    deepest_m = max(depth_m for _, depth_m in places)
+    return degrees(abs([sweep_rad for sweep_rad, depth_m in places if depth_m > deepest_m - LEVEL_M][-1]))
+
+
+def make_candidate(
+    geometry: FlipperGeometry, gait: GaitParameters, depth_m: float, path: GaitPath | None = None
+) -> Candidate:
+    motion = motion_of_path(path, geometry, depth_m) if path else motion_of(gait, geometry, depth_m)
+    return Candidate(depth_m, gait, stride_duration_s(path or gait, geometry, depth_m), motion)
 
 
 def body_drag(parameters: AdaptationParameters, forecast: DepthForecast) -> BodyDrag:
@@ -110,15 +139,21 @@ class DepthAdaptation:
         geometry: FlipperGeometry,
         gait: GaitParameters,
         rig: Rig = TWO_FLIPPERS,
+        path: GaitPath | None = None,
     ) -> None:
+        """`path`: of a gait file in place of the crutching gait, of which the forecast knows where its plates rise."""
         self.parameters = parameters
         self.geometry = geometry
+        self.path = path
         self.gait = gait
+        if path:
+            self.gait = replace(gait, sweep_angle_deg=rising_deg(path, geometry, parameters.initial_depth_m))
         self._flippers = len(rig.flippers)
+        self._pushes = self._flippers if path and path.right_offset_fraction else 1  # a stride, by flippers in turn
         self._pairs = self._gaits_and_depths()
         self._depths_m = sorted({depth_m for _, depth_m in self._pairs})
         self.candidates: list[Candidate] = []
-        self.forecast = DepthForecast(geometry, gait, parameters.motor_force_n, rig)
+        self.forecast = DepthForecast(geometry, self.gait, parameters.motor_force_n, rig)
         self.reset(parameters.initial_depth_m)
 
     def reset(self, depth_m: float) -> None:
@@ -127,11 +162,13 @@ class DepthAdaptation:
 
     def _gaits_and_depths(self) -> Sequence[tuple[GaitParameters, float]]:
         """Return gait and depth of every candidate, narrow before wide and shallow before deep."""
+        if self.path:
+            return [(self.gait, depth_m) for depth_m in path_depths(self.parameters, self.geometry, self.path)]
         return [(self.gait, depth_m) for depth_m in depth_grid(self.parameters, self.geometry, self.gait)]
 
     def prepare(self) -> Work[None]:
         while len(self.candidates) < len(self._pairs):
-            self.candidates.append(make_candidate(self.geometry, *self._pairs[len(self.candidates)]))
+            self.candidates.append(make_candidate(self.geometry, *self._pairs[len(self.candidates)], self.path))
             yield
 
     def choose(
@@ -154,7 +191,9 @@ class DepthAdaptation:
         return self.choice
 
     def _advances(self, strides: Sequence[StrideEstimate]) -> bool:
-        return any(stride.step_m > self.geometry.flipper_length_m / 2.0 for stride in strides)
+        """Return whether the body made a step; a path may go backward."""
+        steps_m = [abs(stride.step_m) if self.path else stride.step_m for stride in strides]
+        return any(step_m > self.geometry.flipper_length_m / 2.0 for step_m in steps_m)
 
     def _deeper(self, walked_m: float) -> DepthChoice:
         """Return the next stride where the mud was too soft to be felt: it would stay so at the same depth.
@@ -180,8 +219,8 @@ class DepthAdaptation:
         The thrust is that in the middle of the sweep: a gait that reaches a depth at the ends reaches it there too.
         """
         drag = body_drag(self.parameters, self.forecast)
-        motor_n = self._flippers * self.parameters.motor_force_n
-        stiffness_n_m = self._flippers * self.parameters.mobilisation_n_m
+        pushing = self._flippers // self._pushes
+        motor_n, stiffness_n_m = pushing * self.parameters.motor_force_n, pushing * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
         tractions = dict[float, Traction]()
         for depths_m in batched(self._depths_m, DEPTHS_PER_UNIT):
@@ -189,21 +228,26 @@ class DepthAdaptation:
                 yield_n = self.forecast.yield_n(depth_m)
                 if yield_n is None:
                     return []
+                yield_n /= self._pushes
                 tractions[depth_m] = Traction(yield_n=yield_n, motor_n=motor_n, stiffness_n_m=stiffness_n_m)
             yield
         steps_m: list[float] = []
-        for candidates in batched(self.candidates, STEPS_PER_UNIT):
-            steps_m += [carried_m(each.motion, drag, tractions[each.depth_m]) for each in candidates]
+        for candidates in batched(self.candidates, 1 if self.path else STEPS_PER_UNIT):
+            carried = [carried_m(each.motion, drag, tractions[each.depth_m]) for each in candidates]
+            steps_m += [self._pushes * each_m for each_m in carried]
             yield
         return steps_m
 
     def _fastest(self, steps_m: Sequence[float]) -> Work[tuple[int, str]]:
         """Return the index of the fastest candidate that comes out, and the reason; of equals, the deepest.
 
-        The candidates are tried from the fastest on, because the forecast of an extraction takes time.
+        Depths of a path are equals within ALIKE, of which the shallowest needs the least torque. The candidates are
+        tried from the fastest on, because the forecast of an extraction takes time.
         """
         pairs = zip(steps_m, self.candidates, strict=True)
         merits = [(step_m / each.duration_s, each.depth_m) for step_m, each in pairs]
+        if self.path and (most_m_s := (1.0 - ALIKE) * max(merits)[0]) > 0.0:
+            merits = [(min(speed_m_s, most_m_s), -depth_m) for speed_m_s, depth_m in merits]
         ordered = sorted(range(len(merits)), key=merits.__getitem__, reverse=True)
         for indices in batched(ordered, EXTRACTIONS_PER_UNIT):
             for index in indices:

@@ -53,7 +53,8 @@ class GaitPath:
     phase: Annotated[tuple[GaitPhase, ...], Meaning("the phases of a stride, in order")]
     name: Annotated[str, Meaning("for messages and the log; the file's name by default")] = ""
     depths_m: Annotated[
-        tuple[float, ...], Meaning("depth of every stride, or of the strides in turn; without it, as ordered")
+        tuple[float, ...],
+        Meaning("depth of every stride, or of the strides in turn; without it, as ordered or as the mud allows"),
     ] = ()
     right_offset_fraction: Annotated[
         float,

@@ -13,6 +13,7 @@ from dataclasses import replace
 from math import ceil, cos, degrees, floor, hypot, inf, sin
 from typing import NamedTuple
 
+from control.depth.depth_choice import path_depths
 from control.gait.gait import smooth_progress
 from control.gait.recovery import OUT_M, is_in_mud
 from control.gait.stride_table import Begun, PhaseRow, crutching_parameters, stride_table
@@ -57,25 +58,27 @@ def gait_problems(
 ) -> Iterator[str]:
     """Yield what is wrong with a gait: first with its keys, else with its deepest or its shallowest path.
 
-    Else with the currents in this mud, but not without depths, where the gait adapts to it.
+    Else with the currents in this mud. Without depths the gait adapts to it: an insertion of the crutching gait ends
+    early in firm mud, and of another path the currents are those of its first stride.
     """
     problems = list(key_problems(path))
     if not problems:
-        adaptive_m = () if depths_m else _adaptive_depths_m(path, configuration)
-        walked_m = adaptive_m or depths_m or (configuration.adaptation.initial_depth_m,)
+        first_m = configuration.adaptation.initial_depth_m
+        walked_m = depths_m or _adaptive_depths_m(path, configuration)
         for depth_m in sorted({max(walked_m), min(walked_m)}, reverse=True):
             problems = problems or list(_path_problems(path, configuration, depth_m))
-        if not (problems or adaptive_m):
-            problems = list(_current_problems(path, configuration, max(walked_m), mud))
+        if not problems and (depths_m or crutching_parameters(path) is None):
+            problems = list(_current_problems(path, configuration, max(depths_m, default=first_m), mud))
     yield from (f"{path.name or 'gait'}: {problem}" for problem in problems)
 
 
 def _adaptive_depths_m(path: GaitPath, configuration: Configuration) -> Sequence[float]:
-    """Return the least and the greatest depth that the choice of depth may take; none for a gait that cannot adapt."""
-    adaptation, gait = configuration.adaptation, crutching_parameters(path)
+    """Return the least and the greatest depth that the choice of depth may take, of a path also the first one."""
+    adaptation, gait, geometry = configuration.adaptation, crutching_parameters(path), configuration.geometry
     if gait is None:
-        return ()
-    return adaptation.min_depth_m, min(adaptation.max_depth_m, configuration.geometry.deepest_m(gait.sweep_angle_deg))
+        depths_m = path_depths(adaptation, geometry, path)
+        return *depths_m[:1], *depths_m[-1:], adaptation.initial_depth_m
+    return adaptation.min_depth_m, min(adaptation.max_depth_m, geometry.deepest_m(gait.sweep_angle_deg))
 
 
 def key_problems(path: GaitPath) -> Iterator[str]:

@@ -222,8 +222,6 @@ class OperatorCalls:
     def _checked(self, path: GaitPath, depths_m: Sequence[float]) -> GaitParameters | GaitPath:
         """Return the gait that the loop walks, the parameters of a crutching one. Raises RefusedError."""
         parameters = crutching_parameters(path)
-        if not depths_m and parameters is None:
-            raise RefusedError(f"{path.name}: depths_m is missing: only the crutching gait's depth adapts to the mud")
         configuration, mud = self._loop.configuration, self._loop.learning.estimator.mud_estimate
         if problem := next(gait_problems(path, configuration, depths_m, mud), ""):
             raise RefusedError(problem)

@@ -62,11 +62,20 @@ def test_what_the_daemon_refuses_is_refused_without_one(tmp_path: Path, command:
     assert wrong in failure("gait", command, gait, status=exit_codes.CONFIGURATION)
 
 
-def test_a_gait_without_depths_is_accepted_for_a_walk_that_gives_one(tmp_path: Path) -> None:
+def test_a_gait_without_depths_takes_a_given_one_or_adapts(tmp_path: Path) -> None:
     gait = write_gait(tmp_path, STANCE + SWING)
-    assert "needs --depth" in output("gait", "check", gait)
-    assert "depths_m is missing" in failure("gait", "simulate", gait, status=exit_codes.CONFIGURATION)
+    assert "adapts to the mud" in output("gait", "check", gait)
     output("gait", "simulate", gait, "--depth", "2", "--strides", "1")
+
+
+def test_an_elliptic_gait_adapts_its_depth_also_where_its_file_has_one() -> None:
+    """In this soft mud it goes deeper than the 3 cm of its file, with twice the step."""
+    fixed, adapted = (
+        output("gait", "simulate", "ellipse", "--mud", "53.1", "--strides", "4", *option)
+        for option in ((), ("--adaptive",))
+    )
+    (fixed_cm, _), (adapted_cm, _) = (shown.splitlines()[-1].split(" cm in ") for shown in (fixed, adapted))
+    assert float(adapted_cm) > 2.0 * float(fixed_cm) > 0.0
 
 
 def test_a_robot_that_cannot_be_armed_walks_no_gait_and_says_why(tmp_path: Path) -> None:

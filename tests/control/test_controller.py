@@ -1,5 +1,6 @@
 """The targets of the controller in each mode, read back through gains that turn torques into targets."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf, nan, radians
 
@@ -145,12 +146,11 @@ def test_a_walk_is_finished_after_the_strides_that_were_ordered_and_without_a_nu
     assert endless.target.stride >= 2
 
 
-def test_flippers_apart_both_take_the_depths_in_turn() -> None:
-    depths_m = (0.02, 0.04, 0.03)
-    controller = walking(WalkOrder(depths_m[0], adaptive=False, depths_m=depths_m, gait=APART))
+def deepest_of(controller: Controller, strides: int, next_depth_m: Callable[[int], float]) -> list[list[float]]:
+    """Walk, and return the greatest depth of each stride of the left and the right flipper, which are apart."""
     deepest_m: list[list[float]] = [[], []]
-    while controller.gait.stride < 4:
-        controller.gait.next_depth_m = controller.order.depth_of(controller.gait.stride + 1)  # as at each close
+    while controller.gait.stride < strides:
+        controller.gait.next_depth_m = next_depth_m(controller.gait.stride)  # as at each close
         pose = wanted_pose(controller, Mode.WALKING)
         assert controller.target.phase is Phase.STROKE and controller.target.sweep_rad == pytest.approx(pose[0])
         for reached_m, (sweep_rad, lift_rad) in zip(deepest_m, pose.flippers, strict=True):
@@ -159,9 +159,23 @@ def test_flippers_apart_both_take_the_depths_in_turn() -> None:
                 reached_m.append(0.0)
             else:
                 reached_m[-1] = max(reached_m[-1], depth_m)
-    left_m, right_m = ([depth_m for depth_m in reached_m if depth_m] for reached_m in deepest_m)
+    return [[depth_m for depth_m in reached_m if depth_m] for reached_m in deepest_m]
+
+
+def test_flippers_apart_both_take_the_depths_in_turn() -> None:
+    depths_m = (0.02, 0.04, 0.03)
+    controller = walking(WalkOrder(depths_m[0], adaptive=False, depths_m=depths_m, gait=APART))
+    left_m, right_m = deepest_of(controller, 4, lambda stride: controller.order.depth_of(stride + 1))
     assert left_m == pytest.approx([*depths_m, depths_m[0]], abs=1e-4)
     assert right_m[:3] == pytest.approx(depths_m, abs=1e-4)
+
+
+def test_flippers_apart_take_an_adapted_depth_each_where_its_next_stride_begins() -> None:
+    """The later one follows half a stride behind, with the choice of that time."""
+    controller = walking(WalkOrder(0.03, gait=APART))
+    left_m, right_m = deepest_of(controller, 3, lambda stride: (0.02, 0.04, 0.025)[stride])
+    assert left_m == pytest.approx([0.03, 0.02, 0.04], abs=1e-4)
+    assert right_m[:2] == pytest.approx([0.03, 0.04], abs=1e-4)
 
 
 def test_of_flippers_apart_one_stands_still_while_the_other_one_is_stuck_and_goes_on_after_it() -> None:

@@ -10,14 +10,16 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from control.computing.bounded_work import finish
-from control.depth.depth_choice import DepthAdaptation, DepthChoice, depth_grid
+from control.depth.depth_choice import DepthAdaptation, DepthChoice, depth_grid, path_depths, rising_deg
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, carried_m, motion_of
-from control.gait.stride_table import stride_duration_s
+from control.gait.stride_table import crutching, stride_duration_s
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
 from control.records import StrideEstimate
+from firmware_host.configuration.gait_file import gait_document, read_gait
 from tests.control.synthetic_muds import (
     GAIT,
     GEOMETRY,
@@ -279,3 +281,35 @@ def test_candidates_are_computed_once_where_two_preparations_run_in_turn() -> No
     finish(first)
     finish(second)
     assert adaptation.candidates == whole.candidates
+
+
+class TestPaths:
+    """Of gait files: the same choice, by what each path does in the mud."""
+
+    ELLIPSE, ALTERNATING = (read_gait(gait_document(name)) for name in ("ellipse", "alternating"))
+
+    def test_the_crutching_gait_as_a_path_chooses_the_depth_of_the_gait(self) -> None:
+        for k_s in (FIRM, SOFT, reported(0.6e6)):
+            mud_estimate = estimated(k_s, LOOSE)
+            adaptation = DepthAdaptation(PARAMETERS, GEOMETRY, GAIT, path=crutching(GAIT))
+            adaptation.reset(0.03)
+            along_m = choose_now(adaptation, mud_estimate, both()).depth_m
+            assert along_m == pytest.approx(chosen(mud_estimate).depth_m, abs=GRID_M + 1e-9)
+
+    def test_flippers_that_push_in_turn_go_deeper_than_both_together(self) -> None:
+        """Each must move the body alone."""
+        together = replace(self.ALTERNATING, right_offset_fraction=0.0)
+        adaptations = [DepthAdaptation(PARAMETERS, GEOMETRY, GAIT, path=path) for path in (self.ALTERNATING, together)]
+        in_turn, both_push = (choose_now(each, estimated(reported(0.6e6), LOOSE), both()) for each in adaptations)
+        assert in_turn.depth_m > both_push.depth_m
+
+    def test_a_path_has_the_depths_that_all_of_it_reaches(self) -> None:
+        wide = WayPoint(60.0, depth_fraction=1.0), WayPoint(-60.0, depth_fraction=1.0)
+        path = GaitPath((GaitPhase("stance", wide, speed_m_s=0.3), *self.ELLIPSE.phase[-1:]))
+        depths_m = path_depths(PARAMETERS, GEOMETRY, path)
+        reach_m = GEOMETRY.deepest_m(60.0)
+        assert depths_m == tuple(depth_m for depth_m in DEPTHS_M if depth_m <= reach_m) != tuple(DEPTHS_M)
+
+    def test_plates_rise_from_where_they_are_deepest(self) -> None:
+        assert rising_deg(self.ELLIPSE, GEOMETRY, 0.03) == pytest.approx(0.0, abs=1e-9)
+        assert rising_deg(crutching(GAIT), GEOMETRY, 0.03) == pytest.approx(GAIT.sweep_angle_deg)

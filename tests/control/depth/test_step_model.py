@@ -5,6 +5,7 @@ the mud withstands. There the plates shear through. A motor at its limit lets th
 creep.
 """
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from math import cos, inf, pi, radians, sin
@@ -16,10 +17,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.depth import step_model
-from control.depth.step_model import BodyDrag, Traction, carried_m, coast_m, motion_of
+from control.depth.step_model import BodyDrag, Traction, carried_m, coast_m, motion_of, motion_of_path
 from control.gait.gait import RAMP_S
+from control.gait.stride_table import crutching
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
 
 Array = NDArray[np.float64]
 
@@ -52,6 +55,10 @@ def ramped_m_s(length_m: float, duration_s: float, time_s: float) -> float:
     if to_an_end_s <= 0.0:
         return 0.0
     return length_m / (duration_s - ramp_s) * (1.0 - cos(pi * min(to_an_end_s / ramp_s, 1.0))) / 2.0
+
+
+def mirrored_phase(phase: GaitPhase) -> GaitPhase:
+    return replace(phase, way_points=tuple(replace(each, sweep_deg=-each.sweep_deg) for each in phase.way_points))
 
 
 def swept_m(gait: GaitParameters) -> float:
@@ -111,6 +118,40 @@ class TestAgainstFineSteps:
     def test_the_step_is_that_of_the_equation_of_motion(self, gait: GaitParameters) -> None:
         coarsely_m = [step_m(gait, drag, Traction(*traction), depth_m) for *traction, drag, depth_m in CASES]
         assert np.abs(coarsely_m - finely_m(gait)).max() < 2.0 * step_model.STEP_S * top_speed_m_s(gait)
+
+
+class TestPaths:
+    @pytest.mark.parametrize("motor_n", [12.0, 1e3])
+    def test_the_crutching_gait_carries_the_body_as_far_where_it_is_a_path(self, motor_n: float) -> None:
+        """But for the last of the extraction, in which the thrust of a path falls a little sooner."""
+        path = crutching(WALKING)
+        for yield_n in (4.0, 8.0, 20.0):
+            traction = Traction(yield_n, motor_n, 500.0)
+            along_m = carried_m(motion_of_path(path, GEOMETRY, 0.03), RAIL, traction)
+            assert along_m == pytest.approx(step_m(WALKING, RAIL, traction, 0.03), rel=0.05)
+
+    def test_a_path_and_its_mirror_image_push_alike(self) -> None:
+        path = crutching(CAREFUL)
+        mirrored = replace(path, phase=tuple(map(mirrored_phase, path.phase)))
+        forward, backward = (motion_of_path(each, GEOMETRY, 0.03) for each in (path, mirrored))
+        assert backward == forward and max(swept for swept, _ in forward) == pytest.approx(swept_m(CAREFUL))
+
+    def test_mud_holds_a_path_only_where_it_is_deep(self) -> None:
+        """Half an ellipse of 3 cm: past its peak all of the thrust, on the surface none, and less on the way down."""
+        ends = WayPoint(-30.0, depth_m=0.0), WayPoint(30.0, depth_m=0.0)
+        stance = GaitPhase("stance", (WayPoint(0.0, depth_fraction=1.0), ends[0]), "half_ellipse", duration_s=0.5)
+        path = GaitPath((stance, GaitPhase("swing", (WayPoint(0.0, depth_m=-0.01), ends[1]), duration_s=0.5)))
+        swept, fractions = zip(*motion_of_path(path, GEOMETRY, 0.03), strict=True)
+        assert max(fractions) > 0.99 and fractions[-1] == pytest.approx(0.0, abs=1e-6)
+        assert swept[-1] == pytest.approx(2.0 * LENGTH_M * 0.5)
+        shallow = [each > 0.5**1.5 for each in fractions[25:]].index(False) + 25  # the first step above 1.5 cm
+        half_m = LENGTH_M * (0.5 + sin(radians(30.0 * cos(pi / 6.0))))
+        assert swept[shallow - 1] < half_m * (1.0 + 1e-9) and swept[shallow] >= half_m * (1.0 - 1e-9)
+        assert fractions[9] == pytest.approx(step_model.SINKING * fractions[39])
+
+    def test_the_longest_path_takes_no_more_time_steps_than_two_seconds(self) -> None:
+        slow = replace(WALKING, stance_speed_m_s=0.01, extraction_speed_m_s=0.01, insertion_speed_m_s=0.01)
+        assert len(motion_of_path(crutching(slow), GEOMETRY, 0.03)) <= 2.0 / step_model.STEP_S + 3
 
 
 class TestLimits:
