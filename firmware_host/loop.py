@@ -202,7 +202,7 @@ class Loop:
         if mode is Mode.WALKING:
             self.events.report_learning(now_s, self.learning.finish())
             order = self.controller.order
-            self.learning.reset(order.depth_m, order.gait)
+            self.learning.reset(order.depth_m, order.gait if order.adaptive else None)
         if mode is Mode.ARMING:
             self._clearing_until_s = NEVER_S  # a request to clear does not apply to faults from here on
             self.drives.arm(now_s, at_once=True)

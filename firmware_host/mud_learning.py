@@ -104,7 +104,7 @@ class MudLearning:
         self.estimator.work.add(self.adaptation.prepare())
 
     def reset(self, depth_m: float, gait: GaitParameters | GaitPath | None = None) -> None:
-        """Start a new walk with this gait or the configured one; earlier strides stay stored.
+        """Start a new walk, whose depth is chosen for this gait or the configured one; earlier strides stay stored.
 
         Unfinished work is dropped, so call `finish` before.
         """

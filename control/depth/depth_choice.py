@@ -109,8 +109,8 @@ def _places(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> list[t
 def rising_deg(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> float:
     """Return the sweep from the middle at which the plates leave the deepest part of a path."""
     places = _places(path, geometry, depth_m)
-    deepest_m = max(depth_m for _, depth_m in places)
-    return degrees(abs([sweep_rad for sweep_rad, depth_m in places if depth_m > deepest_m - LEVEL_M][-1]))
+    deepest_m = max(at_m for _, at_m in places)
+    return degrees(abs([sweep_rad for sweep_rad, at_m in places if at_m > deepest_m - LEVEL_M][-1]))
 
 
 def make_candidate(

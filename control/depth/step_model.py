@@ -82,6 +82,8 @@ def motion_of(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -
 def motion_of_path(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> Motion:
     """Return the motion of the plates from the end of a swing to the next one, counted in the direction of the push."""
     rows = [row for row in stride_table(path, geometry, depth_m) if row.phase is not Phase.SWING]
+    if not rows:
+        return ()  # the path only swings
     hastened = min(1.0, 2.0 * LONGEST_S / fsum(row.duration_s for row in rows))
     before_rad, before_m = rows[0].sweep_start_rad, rows[0].depth_start_m
     motion, pushed_m = list[tuple[float, float]](), 0.0

@@ -149,6 +149,11 @@ class TestPaths:
         assert swept[shallow - 1] < half_m * (1.0 + 1e-9) and swept[shallow] >= half_m * (1.0 - 1e-9)
         assert fractions[9] == pytest.approx(step_model.SINKING * fractions[39])
 
+    def test_a_path_that_only_swings_carries_nothing(self) -> None:
+        here = WayPoint(30.0, depth_m=-0.01)
+        path = GaitPath(tuple(GaitPhase(name, (here,), duration_s=0.5) for name in ("stance", "swing")))
+        assert carried_m(motion_of_path(path, GEOMETRY, 0.03), RAIL, Traction(8.0, 12.0, 500.0)) == 0.0
+
     def test_the_longest_path_takes_no_more_time_steps_than_two_seconds(self) -> None:
         slow = replace(WALKING, stance_speed_m_s=0.01, extraction_speed_m_s=0.01, insertion_speed_m_s=0.01)
         assert len(motion_of_path(crutching(slow), GEOMETRY, 0.03)) <= 2.0 / step_model.STEP_S + 3
