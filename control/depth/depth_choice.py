@@ -28,13 +28,13 @@ The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its w
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import degrees, isfinite
+from math import degrees, fsum, isfinite
 from typing import NamedTuple, Protocol
 
 from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of, motion_of_path
-from control.gait.stride_table import stride_duration_s, stride_table
+from control.gait.stride_table import PhaseRow, stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
@@ -97,27 +97,28 @@ def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait
 def path_depths(parameters: AdaptationParameters, geometry: FlipperGeometry, path: GaitPath) -> tuple[float, ...]:
     """Return the depths of the grid at which all of a path is in reach."""
     grid_m = depth_grid(parameters, geometry, GaitParameters(sweep_angle_deg=0.0))
-    places = {depth_m: _places(path, geometry, depth_m) for depth_m in grid_m}
-    return tuple([depth_m for depth_m in grid_m if all([geometry.is_reachable(*at) for at in places[depth_m]])])
+    return tuple([depth_m for depth_m in grid_m if _is_in_reach(stride_table(path, geometry, depth_m), geometry)])
 
 
-def _places(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> list[tuple[float, float]]:
-    rows = stride_table(path, geometry, depth_m)
+def _is_in_reach(rows: Sequence[PhaseRow], geometry: FlipperGeometry) -> bool:
+    return all([geometry.is_reachable(*place) for place in _places(rows)])
+
+
+def _places(rows: Sequence[PhaseRow]) -> list[tuple[float, float]]:
+    """Return sweep and depth at some points of a stride."""
     return [row.at(part / PARTS)[:2] for row in rows for part in range(PARTS + 1)]
 
 
 def rising_deg(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> float:
     """Return the sweep from the middle at which the plates leave the deepest part of a path."""
-    places = _places(path, geometry, depth_m)
+    places = _places(stride_table(path, geometry, depth_m))
     deepest_m = max(at_m for _, at_m in places)
     return degrees(abs([sweep_rad for sweep_rad, at_m in places if at_m > deepest_m - LEVEL_M][-1]))
 
 
-def make_candidate(
-    geometry: FlipperGeometry, gait: GaitParameters, depth_m: float, path: GaitPath | None = None
-) -> Candidate:
-    motion = motion_of_path(path, geometry, depth_m) if path else motion_of(gait, geometry, depth_m)
-    return Candidate(depth_m, gait, stride_duration_s(path or gait, geometry, depth_m), motion)
+def make_candidate(geometry: FlipperGeometry, gait: GaitParameters, depth_m: float) -> Candidate:
+    motion = motion_of(gait, geometry, depth_m)
+    return Candidate(depth_m, gait, stride_duration_s(gait, geometry, depth_m), motion)
 
 
 def body_drag(parameters: AdaptationParameters, forecast: DepthForecast) -> BodyDrag:
@@ -150,8 +151,7 @@ class DepthAdaptation:
             self.gait = replace(gait, sweep_angle_deg=rising_deg(path, geometry, parameters.initial_depth_m))
         self._flippers = len(rig.flippers)
         self._pushes = self._flippers if path and path.right_offset_fraction else 1  # a stride, by flippers in turn
-        self._pairs = self._gaits_and_depths()
-        self._depths_m = sorted({depth_m for _, depth_m in self._pairs})
+        self._pairs = list(self._gaits_and_depths())  # that are no candidates yet
         self.candidates: list[Candidate] = []
         self.forecast = DepthForecast(geometry, self.gait, parameters.motor_force_n, rig)
         self.reset(parameters.initial_depth_m)
@@ -162,14 +162,25 @@ class DepthAdaptation:
 
     def _gaits_and_depths(self) -> Sequence[tuple[GaitParameters, float]]:
         """Return gait and depth of every candidate, narrow before wide and shallow before deep."""
-        if self.path:
-            return [(self.gait, depth_m) for depth_m in path_depths(self.parameters, self.geometry, self.path)]
         return [(self.gait, depth_m) for depth_m in depth_grid(self.parameters, self.geometry, self.gait)]
 
     def prepare(self) -> Work[None]:
-        while len(self.candidates) < len(self._pairs):
-            self.candidates.append(make_candidate(self.geometry, *self._pairs[len(self.candidates)], self.path))
+        while self._pairs:
+            gait, depth_m = self._pairs[0]
+            if self.path is None:
+                self.candidates.append(make_candidate(self.geometry, gait, depth_m))
+            else:
+                yield from self._prepare_path(self.path, depth_m)
+            del self._pairs[0]
             yield
+
+    def _prepare_path(self, path: GaitPath, depth_m: float) -> Work[None]:
+        """Add the path at this depth to the candidates if all of it is in reach."""
+        rows = stride_table(path, self.geometry, depth_m)
+        yield
+        if _is_in_reach(rows, self.geometry):
+            duration_s, motion = fsum(row.duration_s for row in rows), motion_of_path(rows, self.geometry, depth_m)
+            self.candidates.append(Candidate(depth_m, self.gait, duration_s, motion))
 
     def choose(
         self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
@@ -223,7 +234,7 @@ class DepthAdaptation:
         motor_n, stiffness_n_m = pushing * self.parameters.motor_force_n, pushing * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
         tractions = dict[float, Traction]()
-        for depths_m in batched(self._depths_m, DEPTHS_PER_UNIT):
+        for depths_m in batched(sorted({each.depth_m for each in self.candidates}), DEPTHS_PER_UNIT):
             for depth_m in depths_m:
                 yield_n = self.forecast.yield_n(depth_m)
                 if yield_n is None:

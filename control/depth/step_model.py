@@ -21,16 +21,16 @@ the authors' logs the sweep's force reaches its plateau with 300 to 700 N/m, the
 A path of a gait file goes through all depths, and F with them.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import ceil, fsum, log1p, radians, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
-from control.gait.stride_table import stride_table
+from control.gait.stride_table import PhaseRow
 from control.geometry import FlipperGeometry
 from control.limits import clip
 from control.parameters.gait_parameters import GaitParameters
-from control.parameters.gait_path import GaitPath
 from control.records import Phase
 
 LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia is negligible
@@ -78,10 +78,9 @@ def motion_of(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -
     return tuple(motion)
 
 
-@lru_cache(maxsize=256)
-def motion_of_path(path: GaitPath, geometry: FlipperGeometry, depth_m: float) -> Motion:
+def motion_of_path(stride: Sequence[PhaseRow], geometry: FlipperGeometry, depth_m: float) -> Motion:
     """Return the motion of the plates from the end of a swing to the next one, counted in the direction of the push."""
-    rows = [row for row in stride_table(path, geometry, depth_m) if row.phase is not Phase.SWING]
+    rows = [row for row in stride if row.phase is not Phase.SWING]
     if not rows:
         return ()  # the path only swings
     hastened = min(1.0, 2.0 * LONGEST_S / fsum(row.duration_s for row in rows))

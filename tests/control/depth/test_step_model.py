@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.depth import step_model
-from control.depth.step_model import BodyDrag, Traction, carried_m, coast_m, motion_of, motion_of_path
+from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, coast_m, motion_of, motion_of_path
 from control.gait.gait import RAMP_S
-from control.gait.stride_table import crutching
+from control.gait.stride_table import crutching, stride_table
 from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.gait_path import GaitPath, GaitPhase, WayPoint
@@ -99,6 +99,10 @@ def finely_m(gait: GaitParameters) -> Array:
     return path
 
 
+def motion_along(path: GaitPath, depth_m: float = 0.03) -> Motion:
+    return motion_of_path(stride_table(path, GEOMETRY, depth_m), GEOMETRY, depth_m)
+
+
 def step_m(gait: GaitParameters, drag: BodyDrag, traction: Traction, depth_m: float) -> float:
     return carried_m(motion_of(gait, GEOMETRY, depth_m), drag, traction)
 
@@ -127,13 +131,13 @@ class TestPaths:
         path = crutching(WALKING)
         for yield_n in (4.0, 8.0, 20.0):
             traction = Traction(yield_n, motor_n, 500.0)
-            along_m = carried_m(motion_of_path(path, GEOMETRY, 0.03), RAIL, traction)
+            along_m = carried_m(motion_along(path), RAIL, traction)
             assert along_m == pytest.approx(step_m(WALKING, RAIL, traction, 0.03), rel=0.05)
 
     def test_a_path_and_its_mirror_image_push_alike(self) -> None:
         path = crutching(CAREFUL)
         mirrored = replace(path, phase=tuple(map(mirrored_phase, path.phase)))
-        forward, backward = (motion_of_path(each, GEOMETRY, 0.03) for each in (path, mirrored))
+        forward, backward = (motion_along(each) for each in (path, mirrored))
         assert backward == forward and max(swept for swept, _ in forward) == pytest.approx(swept_m(CAREFUL))
 
     def test_mud_holds_a_path_only_where_it_is_deep(self) -> None:
@@ -141,7 +145,7 @@ class TestPaths:
         ends = WayPoint(-30.0, depth_m=0.0), WayPoint(30.0, depth_m=0.0)
         stance = GaitPhase("stance", (WayPoint(0.0, depth_fraction=1.0), ends[0]), "half_ellipse", duration_s=0.5)
         path = GaitPath((stance, GaitPhase("swing", (WayPoint(0.0, depth_m=-0.01), ends[1]), duration_s=0.5)))
-        swept, fractions = zip(*motion_of_path(path, GEOMETRY, 0.03), strict=True)
+        swept, fractions = zip(*motion_along(path), strict=True)
         assert max(fractions) > 0.99 and fractions[-1] == pytest.approx(0.0, abs=1e-6)
         assert swept[-1] == pytest.approx(2.0 * LENGTH_M * 0.5)
         shallow = [each > 0.5**1.5 for each in fractions[25:]].index(False) + 25  # the first step above 1.5 cm
@@ -152,11 +156,11 @@ class TestPaths:
     def test_a_path_that_only_swings_carries_nothing(self) -> None:
         here = WayPoint(30.0, depth_m=-0.01)
         path = GaitPath(tuple(GaitPhase(name, (here,), duration_s=0.5) for name in ("stance", "swing")))
-        assert carried_m(motion_of_path(path, GEOMETRY, 0.03), RAIL, Traction(8.0, 12.0, 500.0)) == 0.0
+        assert carried_m(motion_along(path), RAIL, Traction(8.0, 12.0, 500.0)) == 0.0
 
     def test_the_longest_path_takes_no_more_time_steps_than_two_seconds(self) -> None:
         slow = replace(WALKING, stance_speed_m_s=0.01, extraction_speed_m_s=0.01, insertion_speed_m_s=0.01)
-        assert len(motion_of_path(crutching(slow), GEOMETRY, 0.03)) <= 2.0 / step_model.STEP_S + 3
+        assert len(motion_along(crutching(slow))) <= 2.0 / step_model.STEP_S + 3
 
 
 class TestLimits:
