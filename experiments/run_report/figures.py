@@ -151,19 +151,16 @@ def draw_paths(run: Run) -> Figure:
             marks = panel.scatter(places[:, 0], -places[:, 1], 5.0, colours, zorder=3, rasterized=True, **look)
             figure.colorbar(marks, ax=panel, location="bottom", label=label)
         else:
-            say_empty(panel, "no stride that earlier ones predict")
+            say_empty(panel, f"no {label.partition(' (')[0]}")
     return figure
 
 
 def _felt_n(run: Run) -> Layer:
     """Return the force of the mud on the plate in all rows below the surface; in a stance only along the track."""
-    sides = [side for walk in run.walks for side in walk.sides]
-    length_m = run.walks[0].geometry.flipper_length_m
-    rows = [
-        np.stack([length_m * np.sin(side.sweep_angle_rad), side.depth_m, np.hypot(side.force_x_n, up_n)], axis=1)
-        for side in sides
-        for up_n in [np.nan_to_num(side.force_z_n)]
-    ]
+    rows, length_m = [], run.walks[0].geometry.flipper_length_m
+    for side in [side for walk in run.walks for side in walk.sides]:
+        force_n = np.hypot(side.force_x_n, np.nan_to_num(side.force_z_n))
+        rows.append(np.stack([length_m * np.sin(side.sweep_angle_rad), side.depth_m, force_n], axis=1))
     below = np.concatenate(rows)
     below = below[(below[:, 1] > 0.0) & np.isfinite(below).all(axis=1)]
     top_n = float(np.percentile(below[:, 2], 100.0 - INSIDE)) if len(below) else 1.0

@@ -105,7 +105,7 @@ def test_a_path_has_the_force_and_the_error_of_the_prediction_where_the_plate_wa
 
 def test_a_run_whose_strides_nothing_predicts_says_so(run: Run) -> None:
     _, error, *_ = draw_paths(replace(run, estimates=run.estimates.assign(expected_n_m3=np.nan))).axes
-    assert not error.collections and "predict" in error.texts[0].get_text()
+    assert not error.collections and "no prediction" in error.texts[0].get_text()
 
 
 def curves_of(panel: Axes) -> list[NDArray[np.float64]]:
