@@ -94,9 +94,7 @@ def simulate(
     fixed_base = configuration.estimation.fixed_base
     lockstep = Lockstep(configuration, track, seed, disturbances=TRACKWAY, fixed_base=fixed_base)
     calls = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s)
-    document = gait_document(gait)
-    if adaptive:
-        document.pop("depths_m", None)
+    document = gait_document(gait, adaptive=adaptive)
     try:
         lockstep.arm(forced="uncalibrated,watchdog_unknown")  # an emulated drive is as configured
         depths = {"depths_m": [each / 100.0 for each in depth]} if depth else {}

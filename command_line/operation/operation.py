@@ -96,10 +96,7 @@ def walk(
     if gait:
         from firmware_host.configuration.gait_file import as_json, gait_document  # slow to import
 
-        document = gait_document(gait)
-        if adaptive:
-            document.pop("depths_m", None)
-        params["gait"] = as_json(document)
+        params["gait"] = as_json(gait_document(gait, adaptive=adaptive))
     if depth:
         params |= {"depths_m": [each / 100.0 for each in depth]} if len(depth) > 1 else {"depth_m": depth[0] / 100.0}
     if attended:

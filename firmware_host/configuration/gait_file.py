@@ -20,8 +20,11 @@ SHIPPED = Path(__file__).parent / "gaits"
 _READER = RecordReader(GaitPath)
 
 
-def gait_document(gait: str) -> dict[str, Any]:
-    """Return the tables of a gait: a file, or the name of one that ships. Raises ConfigurationError, OSError."""
+def gait_document(gait: str, *, adaptive: bool = False) -> dict[str, Any]:
+    """Return the tables of a gait: a file, or the name of one that ships. Raises ConfigurationError, OSError.
+
+    `adaptive`: without its depths, so that they adapt to the mud.
+    """
     shipped = {path.stem: path for path in SHIPPED.glob("*.toml")}
     path = shipped.get(gait, Path(gait))
     if not path.exists():
@@ -33,6 +36,8 @@ def gait_document(gait: str) -> dict[str, Any]:
     if (length := len(as_json(document))) > LONGEST_JSON:
         most = f"must be at most {LONGEST_JSON}: leave out way-points or digits"
         raise ConfigurationError([f"{path.name}: {length} characters as JSON, {most}"])
+    if adaptive:
+        document.pop("depths_m", None)
     return document
 
 

@@ -221,11 +221,10 @@ class OperatorCalls:
 
     def _checked(self, path: GaitPath, depths_m: Sequence[float]) -> GaitParameters | GaitPath:
         """Return the gait that the loop walks, the parameters of a crutching one. Raises RefusedError."""
-        parameters = crutching_parameters(path)
         configuration, mud = self._loop.configuration, self._loop.learning.estimator.mud_estimate
         if problem := next(gait_problems(path, configuration, depths_m, mud), ""):
             raise RefusedError(problem)
-        return parameters or path
+        return crutching_parameters(path) or path
 
     def _require_depth(self, depth_m: float, source: str = "") -> None:
         """Raise RefusedError, with the source before it, for a depth beyond the configured ones."""

@@ -117,9 +117,7 @@ def test_a_gait_is_refused_while_the_robot_walks_and_where_it_is_wrong(medium: G
 @pytest.mark.parametrize("gait", ["ellipse", "alternating", "backward", "measuring"])
 def test_a_gait_without_a_depth_goes_deeper_in_soft_mud(gait: str) -> None:
     soft = GaitWalk(MUDS["53.1"])
-    document = gait_document(gait)
-    document.pop("depths_m", None)
-    soft.call("walk", gait=json.dumps(document), strides=2)
+    soft.call("walk", gait=as_json(gait_document(gait, adaptive=True)), strides=2)
     soft.finish()
     assert soft.loop.learning.depth_reason == "fastest"
     assert soft.loop.controller.gait.next_depth_m > soft.loop.configuration.adaptation.initial_depth_m + 0.01

@@ -45,7 +45,7 @@ def test_a_replay_returns_the_samples_that_its_estimates_were_fitted_to(two_walk
                 assert len({len(column) for column in samples[:-1]}) == 1
                 assert 0.0 < max(samples.depths_m) <= estimate.depth_m + EXACT
                 side = {"k_p": 1.0, "k_s": samples.sweeps_rad[0], "k_e": -1.0}[name]
-                assert side * samples.sweeps_rad[0] > 0.0  # insertions are in front, extractions behind
+                assert side * samples.sweeps_rad[0] > 0.0  # insertions are at the front, extractions at the rear
                 weighted = np.array(samples.weights_m) * samples.moments_m4
                 plain = np.dot(weighted, samples.torques_nm) / np.dot(weighted, samples.moments_m4)
                 assert samples.slope == pytest.approx(plain, rel=0.3)  # outliers count less in the slope
